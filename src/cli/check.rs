@@ -129,7 +129,6 @@ fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
 }
 
 /// The kinds of studies.
-#[expect(clippy::large_enum_variant, reason = "there is one a file")]
 enum Study {
     Design(DesignSpec),
     Sweep(SweepSpec),

@@ -34,9 +34,12 @@ pub(super) struct Arguments {
     /// Maximum frequency, Hz
     #[arg(long, value_name = "HZ", default_value_t = 10.0)]
     up_to: f64,
-    /// Period of the multisine, s: the reciprocal of the line spacing [default: two lines in the narrowest peak]
+    /// Period of the multisine, s: the line spacing is 2 over it [default: two lines in the narrowest peak]
     #[arg(long, value_name = "S")]
     period: Option<f64>,
+    /// RMS angular rate of the base about an axis, degrees/s; along an axis, 0.1 m/s^2 for each degree/s
+    #[arg(long, value_name = "DEG/S", default_value_t = 0.1)]
+    amplitude: f64,
     /// Quantity compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
@@ -111,7 +114,12 @@ fn head(arguments: &Arguments) -> anyhow::Result<HeadModel> {
 }
 
 fn plan(arguments: &Arguments) -> anyhow::Result<GainPlan> {
-    let given = [("--up-to", Some(arguments.up_to)), ("--period", arguments.period), ("--step", Some(arguments.step))];
+    let given = [
+        ("--up-to", Some(arguments.up_to)),
+        ("--period", arguments.period),
+        ("--step", Some(arguments.step)),
+        ("--amplitude", Some(arguments.amplitude)),
+    ];
     for (name, value) in given {
         if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
             return Err(Usage(format!("{name} {value}: expected a number above 0")).into());
@@ -124,6 +132,8 @@ fn plan(arguments: &Arguments) -> anyhow::Result<GainPlan> {
         },
         up_to_hz: arguments.up_to,
         period_s: arguments.period,
+        rotation_deg_per_s: arguments.amplitude,
+        acceleration_m_per_s2: 0.1 * arguments.amplitude,
         realisations: arguments.realisations,
         step_s: arguments.step,
         seed: Seed(arguments.seed),
@@ -167,13 +177,21 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
         words += &study.ended.as_ref().map(|why| report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
     }
+    let contacts = curves.iter().map(|curve| (curve.axis, curve.coil_contact));
+    let in_swings = swings.iter().flat_map(|study| study.points.iter().map(|p| (study.axis, p.coil_contact)));
+    for (axis, contact) in contacts.chain(in_swings) {
+        if let Some(contact) = contact {
+            let warning = format!("{}: {}", report::quantity_name(axis_name(axis)), contact.warning());
+            words += &report::wrapped(&warning, "  ");
+        }
+    }
     words
 }
 
 fn figures(curves: &[GainCurve], swings: &[SwingStudy]) -> anyhow::Result<Value> {
     let axes = AXES.iter().zip(curves).map(|(axis, curve)| {
         json!({ "axis": axis_name(*axis), "peak": curve.peak, "peak_model": curve.peak_model,
-            "least_coherence": min_coherence(curve), "swing_rms_deg": curve.swing_rms_deg })
+            "least_coherence": min_coherence(curve), "swing_rms_deg": curve.swing_rms_deg, "coil_contact": curve.coil_contact })
     });
     Ok(json!({ "axes": axes.collect::<Vec<_>>(), "swing": serde_json::to_value(swings)? }))
 }

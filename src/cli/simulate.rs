@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 
 fn text(summary: &SimulationSummary) -> String {
     let row = |name: &str, value: String| vec![name.to_owned(), value];
-    let rows = [
+    let mut rows = vec![
         row("duration", format!("{} s", summary.duration_s)),
         row("wall time", format!("{:.2} s ({:.0} x real time)", summary.wall_s, summary.duration_s / summary.wall_s)),
         row("scans", summary.scans.to_string()),
@@ -68,5 +68,8 @@ fn text(summary: &SimulationSummary) -> String {
         row("returns", summary.returns.to_string()),
         row("IMU samples", format!("{} ({} saturated)", summary.imu_samples, summary.imu_samples_at_limit)),
     ];
+    rows.extend(summary.coil_contact.map(|contact| {
+        row("coil contact", format!("from {:.2} s, for {:.2} s", contact.first_t_s, contact.contact_s))
+    }));
     report::table(&[], &rows, true)
 }

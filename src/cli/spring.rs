@@ -11,7 +11,7 @@ use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
 use zsim::study::replace_text;
-use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure};
+use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
 use zsim::study::spring::{Shake, SpringReport, mode_figure, page, spring_report};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
@@ -158,6 +158,7 @@ fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
     let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));
     let folder = output::folder(&wanted, design.out.force)?;
     replace_text(&folder.join("pareto.csv"), &csv(&study))?;
+    replace_text(&folder.join("rejected.csv"), &rejected_csv(&study))?;
     replace_text(&folder.join("design.ron"), &source.text)?;
     pareto_figure(&study).save(&folder, "pareto")?;
     output::print_result(global, &spring_text::design(&study), serde_json::to_value(&study)?, Some(&folder))?;

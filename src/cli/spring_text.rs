@@ -1,9 +1,10 @@
 //! The output of `zsim spring`.
 
 use super::coverage_text;
+use std::collections::{BTreeMap, BTreeSet};
 use zsim::report::page::PageTable;
 use zsim::report::{table, wrapped};
-use zsim::study::spring::design::DesignStudy;
+use zsim::study::spring::design::{DesignStudy, VerifiedDesign};
 use zsim::study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
 
 /// The report on a spring.
@@ -39,6 +40,8 @@ fn under_shake(shaken: &ShakeResponse) -> String {
         line("field of view, deg", |f| Some(f.field_of_view_deg), 1),
         line("maximum rate, deg/s", |f| Some(f.rate_deg_per_s), 0),
         line("stress / yield stress", |f| f.stress_share, 3),
+        line("smallest gap between coils, mm", |f| f.margins.gap_mm, 2),
+        line("clash margin", |f| f.margins.clash, 2),
         line("peak gain of the pitch rate", |f| Some(f.peak_gain), 2),
     ];
     if let Some(seen) = &shaken.coverage {
@@ -51,40 +54,58 @@ fn under_shake(shaken: &ShakeResponse) -> String {
 
 /// The result of a search.
 pub(super) fn design(study: &DesignStudy) -> String {
-    let header = ["coil", "Hz", "view", "simulated", "rate", "sag", "g", "stress", "holds"];
-    let rows: Vec<_> = study
-        .candidates
-        .iter()
-        .map(|verified| {
-            let (coil, figures) = (&verified.candidate.coil, &verified.candidate.figures);
-            let number = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
-            let simulated = verified.simulated.as_ref();
-            vec![
-                format!(
-                    "{:.1}x{:.2}x{:.1}x{:.0}",
-                    coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
-                ),
-                format!("{:.3}", figures.rocking_hz),
-                format!("{:.1}", figures.field_of_view_deg),
-                number(simulated.map(|f| f.field_of_view_deg), 1),
-                number(simulated.map(|f| f.rate_deg_per_s), 0),
-                format!("{:.1}", figures.sag_mm),
-                number(figures.spring_mass_g, 0),
-                number(simulated.and_then(|f| f.stress_share), 2),
-                if verified.holds { "yes" } else { "no" }.to_owned(),
-            ]
-        })
-        .collect();
-    let counts = format!(
+    let mut text = format!(
         "{} designs evaluated, {} within all limits, {} in the Pareto set\n",
         study.evaluated, study.feasible, study.pareto
     );
-    if rows.is_empty() {
-        return counts + "no design is within all limits: widen the bounds or relax a limit\n";
+    text += &listed("rejected by", study.rejected.iter().map(|(limit, count)| (limit.as_str(), *count)));
+    let mut simulated: BTreeMap<&str, usize> = BTreeMap::new();
+    for rejection in study.rejections.iter().filter(|rejection| rejection.simulated) {
+        *simulated.entry(&rejection.limit).or_default() += 1;
     }
-    let legend = "coil: mean diameter x wire diameter x active coils x free length, mm. Rocking frequency (Hz) and field of \
-                  view (deg) in closed form; field of view (deg), maximum rate (deg/s) and stress / yield strength simulated. \
-                  sag: static compression, mm. g: mass of the wire. holds: whether the simulated figures are within the limits.";
-    let legend = wrapped(legend, "");
-    format!("{counts}\n{}\n{legend}", table(&header, &rows, true))
+    text += &listed("rejected by simulation", simulated.into_iter());
+    let unchecked: BTreeSet<&str> = study.candidates.iter().flat_map(|design| &design.unchecked).copied().collect();
+    if !unchecked.is_empty() {
+        let names = unchecked.into_iter().collect::<Vec<_>>().join(", ");
+        text += &wrapped(&format!("not checked, since the material has no strength: {names}"), "  ");
+    }
+    if study.candidates.is_empty() {
+        let advice = "no design is within all limits: widen the bounds, or relax the limit that rejects most designs";
+        return text + &wrapped(advice, "");
+    }
+    let header = ["spring", "Hz", "view", "rate", "g", "clash", "gap", "yield", "fatigue"];
+    let rows: Vec<_> = study.candidates.iter().map(candidate_row).collect();
+    let legend = "spring: name, or mean diameter x wire diameter x active coils x free length, mm. Hz: rocking frequency. g: \
+                  mass of the wire. Simulated: view (field of view, deg), rate (maximum, deg/s), gap (smallest gap between \
+                  coils, mm), and the margins of clash, yield and fatigue; - if the strength is unknown. pareto.csv has \
+                  all figures, rejected.csv why others are no candidates.";
+    format!("{text}\n{}\n{}", table(&header, &rows, true), wrapped(legend, ""))
+}
+
+fn candidate_row(design: &VerifiedDesign) -> Vec<String> {
+    let number = |x: Option<f64>, decimals: usize| x.map_or("-".to_owned(), |x| format!("{x:.decimals$}"));
+    let (figures, simulated) = (&design.candidate.figures, &design.simulated);
+    let margins = &simulated.margins;
+    vec![
+        design.candidate.coil.label(),
+        format!("{:.3}", figures.rocking_hz),
+        format!("{:.1}", simulated.field_of_view_deg),
+        format!("{:.0}", simulated.rate_deg_per_s),
+        number(figures.spring_mass_g, 0),
+        number(margins.clash, 2),
+        number(margins.gap_mm, 2),
+        number(margins.yielding, 2),
+        number(design.fatigue_margin, 2),
+    ]
+}
+
+/// A line with counts, most frequent first; empty without any.
+fn listed<'a>(title: &str, counts: impl Iterator<Item = (&'a str, usize)>) -> String {
+    let mut counts: Vec<_> = counts.collect();
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    if counts.is_empty() {
+        return String::new();
+    }
+    let items: Vec<String> = counts.iter().map(|(limit, count)| format!("{limit} {count}")).collect();
+    wrapped(&format!("{title}: {}", items.join(", ")), "  ")
 }

@@ -104,6 +104,14 @@ pub(super) struct RelativePose {
 }
 
 impl EndFrames {
+    /// The frames at the ends of the active coils, between rigid ends of `end_m` each.
+    pub fn at_active_coils(&self, end_m: f64) -> Self {
+        Self {
+            base_from_foot: self.base_from_foot * Pose::translation(0.0, 0.0, end_m),
+            head_from_top: self.head_from_top * Pose::translation(0.0, 0.0, -end_m),
+        }
+    }
+
     pub fn at(&self, now: &MotionState<'_>) -> RelativePose {
         let world_from_foot = now.base.world_from_body * self.base_from_foot;
         let foot_from_top = world_from_foot.inv_mul(&(now.world_from_head * self.head_from_top));

@@ -3,6 +3,7 @@
 use super::actuated::Actuated;
 use super::body::Body;
 use super::carrier;
+use super::coil_gap::CoilGap;
 use super::compliant::{CompliantLinkage, ElementLoad};
 use super::error::DynamicsError;
 use super::forces::MotionState;
@@ -10,7 +11,7 @@ use super::modes::{LinearModel, Mode};
 use super::mount::{CompliantMount, LinkageOptions, Mount};
 use super::spec::{HeadSpec, LinkageSpec};
 use super::statics::NoEquilibrium;
-use crate::elasticity::stack;
+use crate::elasticity::{ElasticityError, stack};
 use crate::geometry::{Kinematics, Pose, gravity_in_world};
 use crate::spec::{Source, SpecError};
 
@@ -125,6 +126,15 @@ impl HeadModel {
         }
     }
 
+    /// The smallest gap between neighbouring coils of the springs with the head at a pose.
+    ///
+    /// `None` without a coil, or where a segmented spring has no equilibrium.
+    pub fn coil_gap(&self, base_from_head: &Pose) -> Option<CoilGap> {
+        let Linkage::Compliant(compliant) = &self.linkage else { return None };
+        let gaps = compliant.law.springs.iter().filter_map(|spring| spring.coil_gap(base_from_head).ok().flatten());
+        gaps.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+    }
+
     /// Upper bound of the natural frequencies, with hand hold and end stop, Hz.
     ///
     /// Zero for a rigid or actuated mount.
@@ -176,6 +186,9 @@ impl CompliantMount<'_> {
 
     /// The message for a head without stable equilibrium: cause, and mass that the linkage supports.
     fn explain(&self, failure: &NoEquilibrium, source: &Source) -> SpecError {
+        if let NoEquilibrium::Spring(ElasticityError::TooFewSegments { .. }) = failure {
+            return SpecError::about(source, "segments", failure.to_string());
+        }
         let (mut stable, mut unstable) = (0.0, 1.0);
         for _ in 0..24 {
             let middle = 0.5 * (stable + unstable);

@@ -11,7 +11,9 @@ mod base_solver;
 mod body;
 mod capacity;
 mod carrier;
+mod coil_gap;
 mod compliant;
+mod contact;
 mod cord;
 mod elements;
 mod engine;
@@ -32,9 +34,11 @@ mod statics;
 
 pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;
-pub use capacity::max_head_mass_kg;
+pub use capacity::{MassLimit, max_head_mass, stands_with_mass};
 pub use carrier::CarrierSpec;
+pub use coil_gap::CoilGap;
 pub use compliant::{ElementKind, ElementLoad};
+pub use contact::{CoilContact, ContactWatch};
 pub use elements::{
     CableSpec, CordSpec, CordStiffnessSpec, ElementSpec, FloatSpec, SpringElementSpec, SpringMassSpec,
     UniversalJointSpec,

@@ -11,7 +11,7 @@ use super::joint::UniversalJoint;
 use super::mounted_spring::{MountedSpring, WireMass};
 use super::spec::{DampingSpec, EndStopSpec, HoldSpec, LinkageSpec};
 use super::statics::{NoEquilibrium, Statics};
-use crate::elasticity::{Matrix6, SpringDesign, SpringSpec};
+use crate::elasticity::{ElasticityError, Matrix6, SpringDesign, SpringSpec};
 use crate::geometry::{Pose, Rotation, gravity_in_world};
 use crate::spec::{Source, SpecError};
 
@@ -36,6 +36,8 @@ pub(super) struct CompliantMount<'a> {
     start: Option<Pose>,
     body: &'a Body,
     options: LinkageOptions,
+    /// Whether a pulled spring gets more segments than its spec has, if its pull needs them.
+    refines: bool,
 }
 
 /// Options that apply to a linkage as a whole.
@@ -84,8 +86,16 @@ impl<'a> Mount<'a> {
             | LinkageSpec::Suspension { damping_ratio, end_stop, hold, .. } => (*damping_ratio, *end_stop, *hold),
         };
         let options = LinkageOptions { damping_ratio, end_stop, hold };
-        let mut mount =
-            CompliantMount { springs: vec![], cords: vec![], floats: vec![], joint: None, start: None, body, options };
+        let mut mount = CompliantMount {
+            springs: vec![],
+            cords: vec![],
+            floats: vec![],
+            joint: None,
+            start: None,
+            body,
+            options,
+            refines: false,
+        };
         match linkage {
             LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => {}
             LinkageSpec::Spring {
@@ -168,8 +178,18 @@ impl CompliantMount<'_> {
             })?;
             self.cords.push(cord);
         }
-        self.springs.push(SpringMount { design, segments: parameters.segments, ends: parameters.ends, wire_mass_kg });
+        let end_m = parameters.spring.end_length_m()?;
+        let ends = parameters.ends.at_active_coils(end_m);
+        self.springs.push(SpringMount { design, segments: parameters.segments, ends, wire_mass_kg });
         Ok(())
+    }
+
+    /// The mount in which a pulled spring gets as many segments as its pull needs.
+    ///
+    /// The mass that a linkage supports must not depend on the number of segments.
+    pub fn refined(mut self) -> Self {
+        self.refines = true;
+        self
     }
 
     /// The options of the linkage.
@@ -237,7 +257,10 @@ impl CompliantMount<'_> {
     fn law(&self, loads_n: &[f64]) -> Result<ForceLaw, NoEquilibrium> {
         let mut springs = Vec::new();
         for (mount, load_n) in self.springs.iter().zip(loads_n) {
-            springs.push(mount.loaded(*load_n)?);
+            springs.push(match mount.loaded(*load_n, mount.segments) {
+                Err(ElasticityError::TooFewSegments { needed, .. }) if self.refines => mount.loaded(*load_n, needed)?,
+                loaded => loaded?,
+            });
         }
         let reference = match springs.first() {
             Some(only) if self.is_one_spring() => only.ends,
@@ -277,14 +300,18 @@ impl SpringMount {
         self.wire_mass_kg.is_none()
     }
 
-    fn loaded(&self, load_n: f64) -> Result<MountedSpring, NoEquilibrium> {
-        let spring = self.design.loaded_spring(load_n, self.segments)?;
+    fn loaded(&self, load_n: f64, segments: usize) -> Result<MountedSpring, ElasticityError> {
+        let spring = self.design.loaded_spring(load_n, segments)?;
         let mass = match (&self.design, self.wire_mass_kg) {
             (SpringDesign::Coil(coil), Some(mass_kg)) => {
                 Some(WireMass::new(mass_kg, 0.5 * coil.coil_diameter_m(), spring.length_m()))
             }
             _ => None,
         };
-        Ok(MountedSpring { spring, ends: self.ends, mass })
+        let coil = match &self.design {
+            SpringDesign::Coil(coil) => Some(*coil),
+            SpringDesign::Stiffness { .. } => None,
+        };
+        Ok(MountedSpring { spring, ends: self.ends, mass, coil })
     }
 }

@@ -1,7 +1,9 @@
 //! A spring with mounting points and, optionally, wire mass.
 
 use super::forces::{EndFrames, Forces, MotionState, RelativePose};
-use crate::elasticity::{Deformation, ElasticityError, Matrix6, Spring, SpringState, Vector6, blocks, split, stack};
+use crate::elasticity::{
+    Coil, Deformation, ElasticityError, Matrix6, Spring, SpringState, Vector6, blocks, split, stack,
+};
 use crate::geometry::{Matrix, Pose, Vector, skew};
 
 /// A spring and the frames of the mounting points.
@@ -10,6 +12,8 @@ pub(super) struct MountedSpring {
     pub spring: Spring,
     pub ends: EndFrames,
     pub mass: Option<WireMass>,
+    /// The coil; `None` for a spring given by a stiffness matrix.
+    pub coil: Option<Coil>,
 }
 
 /// The mass of a spring's wire, reduced to the spring's top.

@@ -1,7 +1,7 @@
 //! A chain of elements in series with massless inner nodes in equilibrium.
 
 use super::deformation::{blocks, split, stack};
-use super::{Deformation, ElasticityError, Element, Matrix6, Vector6};
+use super::{Deformation, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
 use crate::geometry::{Matrix, Pose, Rotation, Vector, left_jacobian, skew};
 
 /// Maximum Newton iterations.
@@ -55,6 +55,11 @@ impl Chain {
     pub(super) fn potential_j(&self, element: &Element) -> f64 {
         let segments = self.nodes.windows(2).map(|ends| ends[0].inv_mul(&ends[1]));
         segments.map(|one_from_next| element.potential_j(&Deformation::of(&one_from_next).coordinates)).sum()
+    }
+
+    /// The loads on the sections at the two ends of each element.
+    pub(super) fn section_loads(&self, element: &Element) -> Vec<SectionLoad> {
+        self.nodes.windows(2).flat_map(|ends| element.section_loads(&ends[0].inv_mul(&ends[1]))).collect()
     }
 
     /// Moves the inner nodes into equilibrium for a top at `base_from_top`.

@@ -69,6 +69,21 @@ impl Coil {
         self.coil_diameter_m
     }
 
+    /// Diameter of the wire, m.
+    pub fn wire_diameter_m(&self) -> f64 {
+        self.wire_diameter_m
+    }
+
+    /// Number of active coils.
+    pub fn active_coils(&self) -> f64 {
+        self.active_coils
+    }
+
+    /// Moduli of the wire.
+    pub fn moduli(&self) -> &Moduli {
+        &self.moduli
+    }
+
     /// Free length, m.
     pub fn free_length_m(&self) -> f64 {
         self.free_length_m
@@ -108,11 +123,9 @@ impl Coil {
             return Err(ElasticityError::Clash { load_n, loaded_mm, solid_mm });
         }
         let poisson = self.moduli.poisson();
-        let bending_per_length = self.moduli.youngs_pa * self.wire_diameter_m.powi(4)
-            / (32.0 * self.coil_diameter_m * self.active_coils * (2.0 + poisson));
         Ok(Column {
             length_m,
-            bending_nm2: length_m * bending_per_length,
+            bending_nm2: length_m * self.bending_nm_per_rad(),
             shear_n: 2.0 * (1.0 + poisson) * self.axial_n_per_m() * length_m,
             axial_n_per_m: self.axial_n_per_m(),
             torsion_nm_per_rad: self.torsion_nm_per_rad(),

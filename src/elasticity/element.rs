@@ -1,7 +1,7 @@
 //! One element of a spring: a quadratic potential in the deformation coordinates.
 
 use super::deformation::{blocks, split, stack};
-use super::{Column, Deformation, ElasticityError, Matrix6, Vector6, conditioning, loaded_stiffness};
+use super::{Column, Deformation, ElasticityError, Matrix6, SectionLoad, Vector6, conditioning, loaded_stiffness};
 use crate::geometry::{Matrix, Pose, Vector, skew};
 
 /// A segment of a spring between two nodes, straight under an axial load in the reference state.
@@ -79,6 +79,13 @@ impl Element {
     pub fn wrench(&self, base_from_top: &Pose) -> Vector6 {
         let deformation = Deformation::of(base_from_top);
         -deformation.wrench(&self.gradient(&deformation.coordinates))
+    }
+
+    /// The loads on the sections at the base and at the top.
+    pub fn section_loads(&self, base_from_top: &Pose) -> [SectionLoad; 2] {
+        let on_top = self.wrench(base_from_top);
+        let through_base = -Self::reaction(base_from_top, &on_top);
+        [SectionLoad::of_wrench(&through_base), SectionLoad::in_base(base_from_top, &on_top)]
     }
 
     /// The wrench on the base, about the base, that balances `wrench` on the top.

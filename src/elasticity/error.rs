@@ -86,6 +86,16 @@ pub enum ElasticityError {
         /// Length under the load, mm.
         length_mm: f64,
     },
+    /// The tension is beyond the range of the force law.
+    #[error(
+        "a pull of {pull_n:.1} N stretches the spring to {length_mm:.0} mm, which is beyond the range of the force law"
+    )]
+    PullTooStrong {
+        /// Tension, N.
+        pull_n: f64,
+        /// Length under the load, mm.
+        length_mm: f64,
+    },
     /// Several segments for a spring that is given by a stiffness matrix.
     #[error("a spring given by a stiffness matrix has one segment, not {segments}: only a coil can be divided")]
     CannotBeDivided {
@@ -99,6 +109,19 @@ pub enum ElasticityError {
         segments: usize,
         /// Maximum number of segments.
         max: usize,
+    },
+    /// The tension is too high for the number of segments.
+    #[error(
+        "a pull of {pull_n:.1} N is too strong for a spring of {segments} segment(s): its segments are then too long for the \
+         force law; use {needed} segments or more"
+    )]
+    TooFewSegments {
+        /// Tension, N.
+        pull_n: f64,
+        /// Number of segments.
+        segments: usize,
+        /// Smallest sufficient number of segments.
+        needed: usize,
     },
     /// The equilibrium of the inner nodes did not converge.
     #[error("the equilibrium of the spring's {segments} segments did not converge: residual {residual_n:.1e} N")]

@@ -73,12 +73,17 @@ impl Column {
 /// depends on the constraints of the top.
 ///
 /// # Errors
-/// When the load buckles the column even with the top guided (free to translate sideways, not to rotate).
+/// When the load buckles the column even with the top guided (free to translate sideways, not to rotate), or pulls it
+/// beyond the range in which the transfer matrix can be inverted.
 pub fn loaded_stiffness(column: &Column) -> Result<Matrix6, ElasticityError> {
-    let lateral = column
-        .lateral_stiffness()
-        .filter(|k| k.iter().all(|x| x.is_finite()) && k[(0, 0)] > 0.0)
-        .ok_or(ElasticityError::Buckles { load_n: column.load_n, length_mm: column.length_m * 1e3 })?;
+    let lateral =
+        column.lateral_stiffness().filter(|k| k.iter().all(|x| x.is_finite()) && k[(0, 0)] > 0.0).ok_or_else(|| {
+            let length_mm = column.length_m * 1e3;
+            match column.load_n {
+                load_n if load_n < 0.0 => ElasticityError::PullTooStrong { pull_n: -load_n, length_mm },
+                load_n => ElasticityError::Buckles { load_n, length_mm },
+            }
+        })?;
     let mut stiffness = Matrix6::zeros();
     for (shift, turn, sign) in [(0, 4, 1.0), (1, 3, -1.0)] {
         stiffness[(shift, shift)] = lateral[(0, 0)];

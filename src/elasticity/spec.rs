@@ -1,13 +1,12 @@
 //! Specs of springs.
 
-use super::{Coil, ElasticityError, Matrix6, Moduli, Spring};
+use super::{Coil, ElasticityError, Material, Matrix6, Spring};
 use crate::spec::{Kind, SpecError, checked};
 use serde::{Deserialize, Serialize};
 
 /// Spec of a spring: `specs/springs/NAME.ron`, or a value within a head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
-#[expect(clippy::large_enum_variant, reason = "there is one a head")]
 pub enum SpringSpec {
     /// A spring of the library or of a file, by name: `named("25x3")`.
     Named(String),
@@ -25,6 +24,9 @@ pub enum SpringSpec {
         /// Free length, without load, mm.
         #[serde(with = "checked::Positive")]
         free_length_mm: f64,
+        /// Ends of the spring, which are a part of its free length.
+        #[serde(default)]
+        ends: EndsSpec,
         /// Material of the wire.
         material: Material,
     },
@@ -40,60 +42,47 @@ pub enum SpringSpec {
     },
 }
 
+/// Ends of a coil spring (Shigley's Mechanical Engineering Design, 9th edition, table 10-1).
+///
+/// The active coils bend, shear and stretch; the ends are rigid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, schemars::JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum EndsSpec {
+    /// The free length is that of the active coils.
+    #[default]
+    ActiveOnly,
+    /// Open ends: the free length has one diameter of the wire in addition; no inactive coils.
+    Open,
+    /// Closed ends: two inactive coils, three diameters of the wire.
+    Closed,
+    /// Closed and ground ends: two inactive coils, two diameters of the wire.
+    ClosedGround,
+}
+
+impl EndsSpec {
+    /// Number of inactive coils.
+    pub fn inactive_coils(self) -> f64 {
+        match self {
+            EndsSpec::ActiveOnly | EndsSpec::Open => 0.0,
+            EndsSpec::Closed | EndsSpec::ClosedGround => 2.0,
+        }
+    }
+
+    /// Length of the two ends together, in diameters of the wire.
+    fn wire_diameters(self) -> f64 {
+        match self {
+            EndsSpec::ActiveOnly => 0.0,
+            EndsSpec::Open => 1.0,
+            EndsSpec::Closed => 3.0,
+            EndsSpec::ClosedGround => 2.0,
+        }
+    }
+}
+
 /// One row of a stiffness matrix: force (N) or torque (N m) per x, y, z (m) and rx, ry, rz (rad).
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(transparent)]
 pub struct StiffnessRow(#[serde(with = "checked::FiniteArray::<6>")] pub [f64; 6]);
-
-/// Material of a wire.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
-#[serde(deny_unknown_fields, rename_all = "snake_case")]
-pub enum Material {
-    /// Patented or music wire: E = 206 GPa, G = 79.3 GPa.
-    SpringSteel,
-    /// Stainless 302: E = 193 GPa, G = 69 GPa.
-    Stainless,
-    /// A material with given moduli.
-    Moduli {
-        /// Young's modulus, GPa.
-        #[serde(with = "checked::Positive")]
-        youngs_gpa: f64,
-        /// Shear modulus, GPa.
-        #[serde(with = "checked::Positive")]
-        shear_gpa: f64,
-        /// Density, kg/m^3; needed only for the mass of the wire.
-        #[serde(default)]
-        density_kg_per_m3: Option<Density>,
-    },
-}
-
-/// A positive density, kg/m^3.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
-#[serde(transparent)]
-pub struct Density(#[serde(with = "checked::Positive")] pub f64);
-
-impl Material {
-    /// The elastic moduli.
-    pub fn moduli(&self) -> Moduli {
-        let (youngs_gpa, shear_gpa) = match self {
-            Material::SpringSteel => (206.0, 79.3),
-            Material::Stainless => (193.0, 69.0),
-            Material::Moduli { youngs_gpa, shear_gpa, .. } => (*youngs_gpa, *shear_gpa),
-        };
-        Moduli { youngs_pa: youngs_gpa * 1e9, shear_pa: shear_gpa * 1e9 }
-    }
-
-    /// The density, kg/m^3, or `None` if unknown.
-    ///
-    /// 7850 for carbon steel, 7900 for stainless 302 (typical values).
-    pub fn density_kg_per_m3(&self) -> Option<f64> {
-        match self {
-            Material::SpringSteel => Some(7850.0),
-            Material::Stainless => Some(7900.0),
-            Material::Moduli { density_kg_per_m3, .. } => density_kg_per_m3.map(|density| density.0),
-        }
-    }
-}
 
 /// An unloaded spring: a [`SpringSpec`] with the name resolved and the values validated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,6 +115,17 @@ impl SpringSpec {
         }
     }
 
+    /// Length of each rigid end, m; 0 for a stiffness matrix.
+    ///
+    /// # Errors
+    /// As [`SpringSpec::resolved`].
+    pub fn end_length_m(&self) -> Result<f64, SpecError> {
+        Ok(match self.resolved()? {
+            SpringSpec::Coil { wire_diameter_mm, ends, .. } => 0.5e-3 * wire_diameter_mm * ends.wire_diameters(),
+            SpringSpec::Named(_) | SpringSpec::Stiffness { .. } => 0.0,
+        })
+    }
+
     /// Mass of the active wire, kg.
     ///
     /// `None` for a stiffness matrix or a material without density.
@@ -139,16 +139,17 @@ impl SpringSpec {
         Ok(material.density_kg_per_m3().map(|density| density * coil.wire_volume_m3()))
     }
 
-    /// The validated spring.
+    /// The validated spring; a coil without its rigid ends.
     ///
     /// # Errors
     /// When there is no spring of that name, the file is invalid or names another spring, or a value is invalid.
     pub fn design(&self) -> Result<SpringDesign, ElasticityError> {
         match self {
             SpringSpec::Named(_) => self.resolved()?.design(),
-            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, material } => {
+            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, ends, material } => {
                 let (diameter_m, wire_m) = (coil_diameter_mm * 1e-3, wire_diameter_mm * 1e-3);
-                let coil = Coil::new(diameter_m, wire_m, *active_coils, free_length_mm * 1e-3, material.moduli())?;
+                let active_m = free_length_mm * 1e-3 - ends.wire_diameters() * wire_m;
+                let coil = Coil::new(diameter_m, wire_m, *active_coils, active_m, material.moduli())?;
                 Ok(SpringDesign::Coil(coil))
             }
             SpringSpec::Stiffness { length_mm, rows } => {

@@ -2,7 +2,7 @@
 
 use super::chain::Chain;
 use super::deformation::Deformation;
-use super::{Column, ElasticityError, Element, Matrix6, Vector6};
+use super::{Column, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
 use crate::geometry::Pose;
 
 /// Maximum number of segments of a spring.
@@ -31,14 +31,15 @@ impl Spring {
     /// The straight spring has the stiffness of the column for any number of segments.
     ///
     /// # Errors
-    /// When the load buckles the column, or `segments` is not 1 to [`MAX_SEGMENTS`].
+    /// When the load buckles the column, `segments` is not 1 to [`MAX_SEGMENTS`], or a tension needs more of them.
     pub fn of_column(column: &Column, segments: usize) -> Result<Self, ElasticityError> {
         if !(1..=MAX_SEGMENTS).contains(&segments) {
             return Err(ElasticityError::Segments { segments, max: MAX_SEGMENTS });
         }
         // The full column must not buckle either, even if each segment is short enough.
         super::loaded_stiffness(column)?;
-        let element = Element::of_column(&column.segment(segments))?;
+        let element = Element::of_column(&column.segment(segments))
+            .map_err(|error| too_few_segments(column, segments).unwrap_or(error))?;
         Ok(Self { element, segments, length_m: column.length_m })
     }
 
@@ -88,6 +89,27 @@ impl Spring {
         }
     }
 
+    /// The loads on the sections at the two ends of each segment, from the foot to the top.
+    ///
+    /// `deformation` must be that of `base_from_top`.
+    ///
+    /// # Errors
+    /// When the equilibrium of the inner nodes does not converge.
+    pub fn section_loads(
+        &self,
+        state: &mut SpringState,
+        base_from_top: &Pose,
+        deformation: &Deformation,
+    ) -> Result<Vec<SectionLoad>, ElasticityError> {
+        match &mut state.chain {
+            None => Ok(self.element.section_loads(base_from_top).to_vec()),
+            Some(chain) => {
+                chain.find_equilibrium(&self.element, self.length_m, base_from_top, deformation)?;
+                Ok(chain.section_loads(&self.element))
+            }
+        }
+    }
+
     /// The elastic energy with the top at `base_from_top`, J; zero when straight under the reference load.
     ///
     /// # Errors
@@ -102,4 +124,14 @@ impl Spring {
             }
         }
     }
+}
+
+/// The error of a pulled column that more segments can represent.
+///
+/// A column under strong tension bends near its ends only, over the length `sqrt(B / P)`. A segment assumes constant
+/// curvature, so its stiffness in the deformation coordinates becomes indefinite if it is much longer than that.
+fn too_few_segments(column: &Column, segments: usize) -> Option<ElasticityError> {
+    let is_sufficient = |count: &usize| Element::of_column(&column.segment(*count)).is_ok();
+    let needed = (segments + 1..=MAX_SEGMENTS).find(is_sufficient).filter(|_| column.load_n < 0.0)?;
+    Some(ElasticityError::TooFewSegments { pull_n: -column.load_n, segments, needed })
 }

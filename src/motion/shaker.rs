@@ -100,6 +100,10 @@ pub enum SignalSpec {
         /// The sines' phases.
         #[serde(default)]
         phases: Phases,
+        /// Only the odd multiples. The even ones then have no excitation, and quadratic distortion of the response appears
+        /// there, not in the measured lines.
+        #[serde(default)]
+        odd: bool,
     },
     /// Random noise with a flat spectrum within a band: 256 sinusoids.
     BandNoise {
@@ -238,7 +242,7 @@ impl DriveSpec {
             {
                 error("high_hz", format!("the band ends at {high_hz} Hz, not above its begin at {low_hz} Hz"))
             }
-            SignalSpec::Multisine { period_s, low_hz, high_hz, phases, .. } => {
+            SignalSpec::Multisine { period_s, low_hz, high_hz, phases, odd, .. } => {
                 let (first, last) = ((low_hz * period_s - 1e-9).ceil(), (high_hz * period_s + 1e-9).floor());
                 if last < first || last - first >= MAX_LINES {
                     let message = format!(
@@ -247,11 +251,16 @@ impl DriveSpec {
                     );
                     return error("period_s", message);
                 }
+                let multiples: Vec<u32> = (first as u32..=last as u32).filter(|k| !odd || k % 2 == 1).collect();
+                if multiples.is_empty() {
+                    let message = format!("a period of {period_s} s has no odd line from {low_hz} to {high_hz} Hz");
+                    return error("period_s", message);
+                }
                 let mut random = match phases {
                     Phases::Schroeder => None,
                     Phases::Random => Some(seed.stream("multisine")),
                 };
-                Ok(Drive::Sines(multisine((first as u32, last as u32), period_s, level, random.as_mut())))
+                Ok(Drive::Sines(multisine(&multiples, period_s, level, random.as_mut())))
             }
             SignalSpec::BandNoise { low_hz, high_hz, .. } => {
                 let bins = linear_bins((low_hz, high_hz), NOISE_LINES, &mut seed.stream("noise"));
@@ -266,13 +275,13 @@ impl DriveSpec {
     }
 }
 
-/// Equal sines at the multiples `first..=last` of `1 / period_s`.
+/// Equal sines at these multiples of `1 / period_s`.
 ///
 /// The phases are drawn from `random`; without it they are `-pi k (k - 1) / n` (Schroeder 1970).
-fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random: Option<&mut Stream>) -> SineSum<1> {
-    let count = f64::from(last - first + 1);
-    let line = |multiple: u32| {
-        let (freq_hz, k) = (f64::from(multiple) / period_s, f64::from(multiple - first + 1));
+fn multisine(multiples: &[u32], period_s: f64, level: Level, mut random: Option<&mut Stream>) -> SineSum<1> {
+    let count = multiples.len() as f64;
+    let line = |(before, multiple): (usize, &u32)| {
+        let (freq_hz, k) = (f64::from(*multiple) / period_s, before as f64 + 1.0);
         let amplitude = (2.0 / count).sqrt() * level.displacement(freq_hz);
         let phase = match &mut random {
             Some(stream) => TAU * stream.random::<f64>(),
@@ -280,7 +289,7 @@ fn multisine((first, last): (u32, u32), period_s: f64, level: Level, mut random:
         };
         SpectralLine { cycles: freq_hz, amplitudes: [Complex::from_polar(amplitude, phase)] }
     };
-    SineSum::new((first..=last).map(line))
+    SineSum::new(multiples.iter().enumerate().map(line))
 }
 
 impl Drive {

@@ -1,7 +1,7 @@
 use super::faults::Injector;
 use super::run::simulate_together;
 use super::{EPOCH, Faults, Rig, Run, STEP_S, Scenario, SimulationError, SimulationSummary, simulate};
-use crate::dynamics::{CarrierSpec, HeadModel, HeadSimulation, HeadSpec};
+use crate::dynamics::{CarrierSpec, ContactWatch, DynamicsError, HeadModel, HeadSimulation, HeadSpec, HeadState};
 use crate::geometry::{Route, Vector};
 use crate::measurement::{Calibration, Sink};
 use crate::motion::BaseMotion;
@@ -111,13 +111,33 @@ impl Simulation {
         sink: &mut S,
         progress: &mut dyn FnMut(f64),
     ) -> Result<SimulationSummary, SimulationError> {
-        let mut motion = HeadSimulation::new(&self.head, self.motion.as_ref(), STEP_S)?;
+        let mut watch = ContactWatch::new(&self.head);
+        let mut motion = self.watched_motion(&mut watch)?;
         let rig = self.rig();
-        let Some(faults) = &self.faults else { return simulate(&rig, &mut motion, sink, progress) };
-        let mut injector = Injector::new(Some(faults), &rig, sink);
-        let summary = simulate(&rig, &mut motion, &mut injector, progress)?;
-        injector.finish().map_err(SimulationError::Sink)?;
-        Ok(summary)
+        let summary = match &self.faults {
+            None => simulate(&rig, &mut motion, sink, progress)?,
+            Some(faults) => {
+                let mut injector = Injector::new(Some(faults), &rig, sink);
+                let summary = simulate(&rig, &mut motion, &mut injector, progress)?;
+                injector.finish().map_err(SimulationError::Sink)?;
+                summary
+            }
+        };
+        drop(motion);
+        Ok(SimulationSummary { coil_contact: watch.contact(), ..summary })
+    }
+
+    /// The motion of the head, in which `watch` checks each state.
+    fn watched_motion<'a>(
+        &'a self,
+        watch: &'a mut ContactWatch<'_>,
+    ) -> Result<impl Iterator<Item = Result<HeadState, DynamicsError>> + Send + 'a, SimulationError> {
+        let motion = HeadSimulation::new(&self.head, self.motion.as_ref(), STEP_S)?;
+        Ok(motion.inspect(move |state| {
+            if let Ok(state) = state {
+                watch.check(state.t_s, &state.base, &state.head);
+            }
+        }))
     }
 
     /// Runs simulations that [share their rays](Self::shares_rays_with), each with its own sink.
@@ -136,17 +156,23 @@ impl Simulation {
             return Err(SimulationError::DifferentRays);
         }
         let rigs: Vec<Rig> = simulations.iter().map(Self::rig).collect();
-        let mut motion = HeadSimulation::new(&first.head, first.motion.as_ref(), STEP_S)?;
-        if simulations.iter().all(|simulation| simulation.faults.is_none()) {
-            return simulate_together(&rigs, &mut motion, sinks, progress);
-        }
-        let each = simulations.iter().zip(&rigs).zip(sinks.iter_mut());
-        let mut injectors: Vec<_> =
-            each.map(|((simulation, rig), sink)| Injector::new(simulation.faults.as_ref(), rig, &mut **sink)).collect();
-        let mut sinks: Vec<_> = injectors.iter_mut().collect();
-        let summaries = simulate_together(&rigs, &mut motion, &mut sinks, progress)?;
-        injectors.into_iter().try_for_each(Injector::finish).map_err(SimulationError::Sink)?;
-        Ok(summaries)
+        let mut watch = ContactWatch::new(&first.head);
+        let mut motion = first.watched_motion(&mut watch)?;
+        let summaries = if simulations.iter().all(|simulation| simulation.faults.is_none()) {
+            simulate_together(&rigs, &mut motion, sinks, progress)?
+        } else {
+            let each = simulations.iter().zip(&rigs).zip(sinks.iter_mut());
+            let mut injectors: Vec<_> = each
+                .map(|((simulation, rig), sink)| Injector::new(simulation.faults.as_ref(), rig, &mut **sink))
+                .collect();
+            let mut sinks: Vec<_> = injectors.iter_mut().collect();
+            let summaries = simulate_together(&rigs, &mut motion, &mut sinks, progress)?;
+            injectors.into_iter().try_for_each(Injector::finish).map_err(SimulationError::Sink)?;
+            summaries
+        };
+        drop(motion);
+        let coil_contact = watch.contact();
+        Ok(summaries.into_iter().map(|summary| SimulationSummary { coil_contact, ..summary }).collect())
     }
 
     /// Whether `other` has the same physics and rays: it may differ in the IMUs, the lidar errors and the faults only.

@@ -1,3 +1,4 @@
+use crate::dynamics::CoilContact;
 use serde::Serialize;
 
 /// Statistics of a simulation. Wall times are for information and are not part of the data.
@@ -17,6 +18,8 @@ pub struct SimulationSummary {
     pub imu_samples: u64,
     /// Samples of the IMU with a saturated axis.
     pub imu_samples_at_limit: u64,
+    /// Contact of the coils of a spring; `None` if they did not touch.
+    pub coil_contact: Option<CoilContact>,
     /// Wall time of the physics, s; in parallel with the rest.
     pub physics_wall_s: f64,
     /// Wall time of ray casting and echoes, s; in parallel with the rest.

@@ -1,7 +1,7 @@
 //! The unit that a key ends with, by the naming convention of specs and results (`stiffness_n_per_m` is in N/m).
 
 /// Parts of units in keys, and the symbols for them.
-const SYMBOLS: [(&str, &str); 26] = [
+const SYMBOLS: [(&str, &str); 27] = [
     ("m", "m"),
     ("m2", "m²"),
     ("m3", "m³"),
@@ -22,6 +22,7 @@ const SYMBOLS: [(&str, &str); 26] = [
     ("mg", "mg"),
     ("ug", "µg"),
     ("gpa", "GPa"),
+    ("mpa", "MPa"),
     ("ppm", "ppm"),
     ("percent", "%"),
     ("rpm", "1/min"),

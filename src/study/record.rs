@@ -40,7 +40,11 @@ pub fn record(
     if watch.borrow().is_stopped() {
         return Err(StudyError::Stopped);
     }
-    Ok(ran?)
+    let summary = ran?;
+    if let Some(contact) = &summary.coil_contact {
+        watch.borrow_mut().note(&contact.warning());
+    }
+    Ok(summary)
 }
 
 /// Runs simulations that share physics and ray casting, and writes each to a recording.

@@ -3,6 +3,7 @@
 
 mod actuated;
 mod base;
+mod contact;
 mod decay;
 mod elasticity;
 mod elements;

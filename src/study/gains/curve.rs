@@ -1,6 +1,7 @@
 //! Settings and result of a gain measurement.
 
 use crate::dynamics::AccelerationKind;
+use crate::dynamics::CoilContact;
 use crate::dynamics::GainPoints;
 use crate::dynamics::Peak;
 use crate::motion::Axis;
@@ -41,8 +42,8 @@ impl Default for GainPlan {
             points: None,
             up_to_hz: 10.0,
             period_s: None,
-            rotation_deg_per_s: 0.2,
-            acceleration_m_per_s2: 0.02,
+            rotation_deg_per_s: 0.1,
+            acceleration_m_per_s2: 0.01,
             realisations: 4,
             longest_settling_s: 200.0,
             step_s: 1e-3,
@@ -85,6 +86,9 @@ pub struct GainCurve {
     pub swing_rms_deg: f64,
     /// Maximum rotation angle, degrees.
     pub swing_most_deg: f64,
+    /// Contact of the coils of a spring in one of the realisations; `None` if they did not touch.
+    #[serde(default)]
+    pub coil_contact: Option<CoilContact>,
 }
 
 impl GainCurve {

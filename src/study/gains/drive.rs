@@ -46,7 +46,7 @@ impl Schedule {
         let settling_s = ONSET_S + settling_s.min(plan.longest_settling_s);
         let within = modes.iter().filter(|m| m.frequency_hz < plan.up_to_hz);
         let narrowest_hz = within.map(|m| m.frequency_hz * m.damping_ratio).fold(f64::INFINITY, f64::min);
-        let period_s = plan.period_s.unwrap_or_else(|| (1.0 / narrowest_hz).ceil().clamp(20.0, 100.0));
+        let period_s = plan.period_s.unwrap_or_else(|| (2.0 / narrowest_hz).ceil().clamp(20.0, 200.0));
         let steps_to_highest = 1.0 / (plan.step_s * plan.up_to_hz);
         if !(steps_to_highest >= 4.0 && period_s * plan.up_to_hz >= 1.0) {
             let message = format!(
@@ -113,7 +113,7 @@ impl ShakenBase {
         };
         let period_s = schedule.period as f64 * plan.step_s;
         let (low_hz, high_hz, phases) = (1.0 / period_s, plan.up_to_hz, Phases::Random);
-        let signal = SignalSpec::Multisine { period_s, low_hz, high_hz, rms, phases };
+        let signal = SignalSpec::Multisine { period_s, low_hz, high_hz, rms, phases, odd: true };
         let drives = vec![DriveSpec { axis, signal }];
         let spec = MotionSpec::Shaker(ShakerSpec { height_m: 0.0, still_s: 0.0, onset_s: ONSET_S, drives });
         let seed = plan.seed.child(&format!("gains/{axis:?}/{index}"));

@@ -2,7 +2,9 @@
 
 use super::drive::{Schedule, ShakenBase};
 use super::{AXES, GainCurve, GainPlan, GainPoint};
-use crate::dynamics::{AccelerationKind, GainPoints, HeadModel, HeadSimulation, HeadState, Peak};
+use crate::dynamics::{
+    AccelerationKind, CoilContact, ContactWatch, GainPoints, HeadModel, HeadSimulation, HeadState, Peak,
+};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
@@ -92,6 +94,8 @@ struct Record {
     sum_squared_angle: f64,
     /// Maximum rotation angle, rad.
     max_angle: f64,
+    /// Contact of the coils of a spring, also while the head settles.
+    coil_contact: Option<CoilContact>,
 }
 
 /// Simulates one realisation and records its last period.
@@ -106,12 +110,15 @@ fn record(
     let base = ShakenBase::new(axis, index, plan, schedule, &points.base_in_base)?;
     let probe = MotionProbe::new(head, axis, &points, plan.acceleration);
     let mut record = Record::default();
+    let mut watch = ContactWatch::new(head);
     for (step, state) in HeadSimulation::new(head, &base, plan.step_s)?.enumerate().take(schedule.steps()) {
         let state = state?;
+        watch.check(state.t_s, &state.base, &state.head);
         if step >= schedule.settling {
             probe.sample(&state, &mut record);
         }
     }
+    record.coil_contact = watch.contact();
     Ok(record)
 }
 
@@ -185,8 +192,8 @@ fn curve(
             phase_model_rad: model.arg(),
         }
     };
-    // Skip the constant; the excited lines end at the highest frequency.
-    let lines = measured.iter().skip(1).take_while(|p| p.freq_hz <= plan.up_to_hz * (1.0 + 1e-9));
+    // The odd lines are excited, up to the highest frequency.
+    let lines = measured.iter().skip(1).step_by(2).take_while(|p| p.freq_hz <= plan.up_to_hz * (1.0 + 1e-9));
     let points: Vec<GainPoint> = lines.map(point).collect();
     let samples = records.iter().map(|r| r.base.len()).sum::<usize>() as f64;
     let mean_squared_angle = records.iter().map(|r| r.sum_squared_angle).sum::<f64>() / samples;
@@ -197,6 +204,7 @@ fn curve(
         points,
         swing_rms_deg: mean_squared_angle.sqrt().to_degrees(),
         swing_most_deg: records.iter().map(|r| r.max_angle).fold(0.0, f64::max).to_degrees(),
+        coil_contact: records.iter().find_map(|r| r.coil_contact),
     })
 }
 

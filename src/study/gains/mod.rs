@@ -1,7 +1,8 @@
 //! Gain curves: ratio of head to base motion amplitude over frequency (the paper's figure 3).
 //!
-//! The base is shaken on one axis at a time by a multisine, whose frequencies are multiples of the reciprocal of its
-//! period, so that a spectrum over one period has no leakage. The head is simulated until transients have decayed, then
+//! The base is shaken on one axis at a time by a multisine, whose frequencies are odd multiples of the reciprocal of its
+//! period: a spectrum over one period has no leakage, and the quadratic distortion of the response, which is at sums and
+//! differences of two lines and therefore at even multiples, is not in the measured lines. The head is simulated until transients have decayed, then
 //! one period is recorded. Several realisations with different phases are averaged (H1 estimator, see
 //! [`transfer_function`](crate::signal::transfer_function)); nonlinearity differs between realisations, which lowers the
 //! coherence and widens the confidence band. Each curve includes the closed form of the linearised head

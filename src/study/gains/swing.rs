@@ -1,7 +1,7 @@
 //! Gains at large amplitudes, where the head is nonlinear: resonance and peak gain over swing amplitude.
 
 use super::{GainPlan, gain_curve};
-use crate::dynamics::{HeadModel, Peak};
+use crate::dynamics::{CoilContact, HeadModel, Peak};
 use crate::motion::Axis;
 use crate::study::{OnProgress, StudyError};
 
@@ -18,6 +18,8 @@ pub struct SwingPoint {
     pub peak: Option<Peak>,
     /// Coherence at the spectral line next to the peak; its difference from 1 is the nonlinear fraction of the power.
     pub coherence: Option<f64>,
+    /// Contact of the coils of a spring; `None` if they did not touch.
+    pub coil_contact: Option<CoilContact>,
 }
 
 /// Resonance over swing amplitude on one axis.
@@ -74,6 +76,7 @@ pub fn swing_study(
                     swing_rms_deg: curve.swing_rms_deg,
                     swing_most_deg: curve.swing_most_deg,
                     peak: curve.peak,
+                    coil_contact: curve.coil_contact,
                     coherence: curve.peak.and_then(next_to).map(|p| p.coherence),
                 });
             }

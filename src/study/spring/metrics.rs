@@ -1,8 +1,10 @@
 //! Metrics of a spring design, from the linearised head or from a simulation.
 
-use super::{Shake, SpringMounting, Wire};
-use crate::dynamics::{AccelerationKind, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState, LinkageSpec};
-use crate::elasticity::{SpringDesign, split};
+use super::Shake;
+use super::margins::{LoadRecord, SpringMargins};
+use super::model::{SpringModel, at_rest};
+use crate::dynamics::{AccelerationKind, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState};
+use crate::elasticity::split;
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
 use crate::random::Seed;
@@ -33,6 +35,8 @@ pub struct DesignMetrics {
     pub rate_deg_per_s: f64,
     /// Maximum stress in the wire divided by the yield stress; `None` if either is not known.
     pub stress_share: Option<f64>,
+    /// Margins of the spring.
+    pub margins: SpringMargins,
 }
 
 impl DesignMetrics {
@@ -67,7 +71,7 @@ const MAX_PEAK_HZ: f64 = 20.0;
 /// When the spec is invalid or the head has no stable rest pose. A head above the maximum mass of its spring is no error.
 pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
     let head = HeadModel::new_without_advice(spec, source)?;
-    let model = SpringModel::of(spec, &head)?;
+    let model = SpringModel::of(spec, head.body())?;
     let frequency_hz = shake.frequency_of(&head);
     let foot = head.default_points().base_in_base;
     let points = GainPoints { base_in_base: foot, head_in_head: head.body().centre_of_mass_in_head };
@@ -75,15 +79,14 @@ pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<De
     let swing = LinearSwing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
     let pitch = swing.amplitude()[4].norm();
     let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
-    let stress = phases.filter_map(|phase| model.stress_pa(&swing.state(phase))).reduce(f64::max);
-    Ok(model.metrics(
-        &head,
-        &SwingResult {
-            field_of_view_deg: 2.0 * pitch.to_degrees(),
-            rate_deg_per_s: (swing.omega * pitch).to_degrees(),
-            stress,
-        },
-    ))
+    let mut loads = LoadRecord::new(&model, &at_rest(&head));
+    phases.for_each(|phase| loads.add(&swing.state(phase), None));
+    let swing = SwingResult {
+        field_of_view_deg: 2.0 * pitch.to_degrees(),
+        rate_deg_per_s: (swing.omega * pitch).to_degrees(),
+        loads: &loads,
+    };
+    Ok(metrics(&model, &head, &swing))
 }
 
 /// Computes the metrics by a full simulation of the shake, with the coverage of `lidar`.
@@ -98,7 +101,7 @@ pub fn simulated(
     plan: &CoveragePlan,
 ) -> Result<(DesignMetrics, Coverage), StudyError> {
     let head = HeadModel::new(spec, source)?;
-    let model = SpringModel::of(spec, &head)?;
+    let model = SpringModel::of(spec, head.body())?;
     let frequency_hz = shake.frequency_of(&head);
     let amplitude = Level::Degrees(shake.pitch_deg);
     let signal = SignalSpec::SweptSine { from_hz: frequency_hz, to_hz: frequency_hz, amplitude };
@@ -108,20 +111,21 @@ pub fn simulated(
     let shake = shaker.build(&Source::in_memory("the shake of the base", ""), None, duration_s, Seed(1))?;
     let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
     let motion = ShakeAboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
-    let (mut stress, mut step) = (None, 0_usize);
+    let (mut loads, mut step) = (LoadRecord::new(&model, &at_rest(&head)), 0_usize);
     let coverage = coverage(&head, &motion, lidar, plan, |state| {
         step += 1;
         // A period has hundreds of steps, so every tenth is sufficient for the maximum.
         if step.is_multiple_of(10) {
-            stress = [stress, model.stress_pa(state)].into_iter().flatten().reduce(f64::max);
+            let base_from_head = state.base.world_from_body.inv_mul(&state.head.world_from_body);
+            loads.add(state, head.coil_gap(&base_from_head).map(|gap| gap.gap_m));
         }
     })?;
     let swing = SwingResult {
         field_of_view_deg: coverage.field_of_view_deg,
         rate_deg_per_s: coverage.gyro.most_deg_per_s,
-        stress,
+        loads: &loads,
     };
-    Ok((model.metrics(&head, &swing), coverage))
+    Ok((metrics(&model, &head, &swing), coverage))
 }
 
 /// Motion of a base that is shaken about the foot of the spring.
@@ -137,72 +141,26 @@ impl BaseMotion for ShakeAboutFoot<'_> {
 }
 
 /// Response to the shake, linear or simulated.
-struct SwingResult {
+struct SwingResult<'a> {
     field_of_view_deg: f64,
     rate_deg_per_s: f64,
-    /// Maximum stress, Pa.
-    stress: Option<f64>,
+    loads: &'a LoadRecord<'a>,
 }
 
-/// Properties of the spring of a head.
-pub(super) struct SpringModel {
-    pub wire: Option<Wire>,
-    pub mounting: Option<SpringMounting>,
-    /// Whether the spring carries the head without a cable; the stress then follows from the motion of the head.
-    pub has_no_cable: bool,
-    pub free_length_m: Option<f64>,
-    pub mass_kg: Option<f64>,
-}
-
-impl SpringModel {
-    pub fn of(spec: &HeadSpec, head: &HeadModel) -> Result<Self, StudyError> {
-        let mounting = SpringMounting::of(spec, head.body());
-        let LinkageSpec::Spring { spring, cable, .. } = &spec.linkage else {
-            return Ok(Self { mounting, ..Self::without_mounting() });
-        };
-        let coil = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
-            SpringDesign::Coil(coil) => Some(coil),
-            SpringDesign::Stiffness { .. } => None,
-        };
-        Ok(Self {
-            wire: Wire::of(spring)?,
-            mounting,
-            has_no_cable: cable.is_none(),
-            free_length_m: coil.map(|coil| coil.free_length_m()),
-            mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
-        })
-    }
-
-    /// A model without wire and mounting, for a head without a rest pose or a spring.
-    pub fn without_mounting() -> Self {
-        Self { wire: None, mounting: None, has_no_cable: false, free_length_m: None, mass_kg: None }
-    }
-
-    /// Maximum stress in the wire in a state, Pa; `None` unless a single spring without a cable carries the head.
-    pub fn stress_pa(&self, state: &HeadState) -> Option<f64> {
-        let (wire, mounting) = self.wire.zip(self.mounting).filter(|_| self.has_no_cable)?;
-        Some(mounting.stress_pa(&wire, state))
-    }
-
-    fn metrics(&self, head: &HeadModel, swing: &SwingResult) -> DesignMetrics {
-        let response = head.frequency_response(&head.default_points());
-        let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, AccelerationKind::Kinematic);
-        let yield_pa = self.wire.and_then(|wire| wire.yield_pa());
-        DesignMetrics {
-            rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
-            peak_gain: peak.map_or(1.0, |peak| peak.gain),
-            sag_mm: self.sag_m(head) * 1e3,
-            spring_mass_g: self.mass_kg.map(|mass_kg| mass_kg * 1e3),
-            field_of_view_deg: swing.field_of_view_deg,
-            rate_deg_per_s: swing.rate_deg_per_s,
-            stress_share: swing.stress.zip(yield_pa).map(|(stress, yield_pa)| stress / yield_pa),
-        }
-    }
-
-    /// Compression at rest: free length minus distance from foot to top, m; 0 if the free length is not known.
-    pub fn sag_m(&self, head: &HeadModel) -> f64 {
-        let (Some(mounting), Some(free_length_m)) = (&self.mounting, self.free_length_m) else { return 0.0 };
-        free_length_m - mounting.length_m(head.base_from_head_at_rest())
+/// The metrics of the head with the response `swing`.
+fn metrics(model: &SpringModel, head: &HeadModel, swing: &SwingResult<'_>) -> DesignMetrics {
+    let response = head.frequency_response(&head.default_points());
+    let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, AccelerationKind::Kinematic);
+    let margins = swing.loads.margins();
+    DesignMetrics {
+        rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
+        peak_gain: peak.map_or(1.0, |peak| peak.gain),
+        sag_mm: model.sag_m(head) * 1e3,
+        spring_mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
+        field_of_view_deg: swing.field_of_view_deg,
+        rate_deg_per_s: swing.rate_deg_per_s,
+        stress_share: margins.yielding.map(|margin| 1.0 / margin),
+        margins,
     }
 }
 

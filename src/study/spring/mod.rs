@@ -1,9 +1,13 @@
 //! Design of the spring under a head: metrics of a given spring, and the search for one that meets goals.
 
+mod capacity;
 pub mod design;
+mod fatigue;
+mod margins;
 mod metrics;
 mod mode_figure;
 mod mode_name;
+mod model;
 mod outline;
 mod page;
 mod report;
@@ -12,6 +16,8 @@ mod tables;
 mod view_plane;
 mod wire;
 
+pub use fatigue::StressCycle;
+pub use margins::SpringMargins;
 pub use metrics::{DesignMetrics, closed_form, simulated};
 pub use mode_figure::mode_figure;
 pub use mode_name::mode_name;

@@ -54,8 +54,8 @@ fn summary(report: &SpringReport) -> String {
     parts.extend(report.coil.as_ref().map(margin));
     let mut text = parts.join("; ") + ".";
     text.replace_range(..1, &text[..1].to_uppercase());
-    if let Some(kg) = report.heaviest_head_kg {
-        text += &format!(" The head has a rest pose up to {kg:.3} kg; it has {:.3} kg.", report.head_mass_kg);
+    if let (Some(kg), Some(limit)) = (report.heaviest_head_kg, &report.heaviest_head_limit) {
+        text += &format!(" The head has {:.3} kg; the maximum is {kg:.3} kg (above: {limit}).", report.head_mass_kg);
     }
     text
 }
@@ -66,7 +66,12 @@ fn margin(coil: &CoilReport) -> String {
     match coil.buckling_margin {
         Some(margin) => format!("buckles at {margin:.1} times the load, if the top cannot tilt"),
         None if coil.load_n > 0.0 => format!("does not buckle; gap between coils {gap_mm:.1} mm"),
-        None => format!("the head pulls, so that the spring cannot buckle; gap between coils {gap_mm:.1} mm"),
+        None => {
+            format!(
+                "pulled by {:.2} N, so that the spring cannot buckle; gap between coils {gap_mm:.1} mm",
+                -coil.load_n
+            )
+        }
     }
 }
 
@@ -136,7 +141,7 @@ fn unloaded_pose(linkage: &LinkageSpec) -> Result<Pose, StudyError> {
         | LinkageSpec::Suspension { base_from_head, .. } => base_from_head.pose(),
         LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } => {
             let length_m = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
-                SpringDesign::Coil(coil) => coil.free_length_m(),
+                SpringDesign::Coil(coil) => coil.free_length_m() + 2.0 * spring.end_length_m()?,
                 SpringDesign::Stiffness { length_m, .. } => length_m,
             };
             base_from_spring.pose() * Pose::translation(0.0, 0.0, length_m) * head_from_spring.pose().inverse()

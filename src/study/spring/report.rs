@@ -1,12 +1,13 @@
 //! Report on a spring under a head: rest pose, stiffness, modes, limits and response to a shake.
 
-use super::metrics::SpringModel;
+use super::capacity::heaviest_head;
+use super::model::{SpringModel, at_rest};
 use super::{DesignMetrics, Shake, closed_form, mode_name, simulated};
 use crate::dynamics::{
-    AccelerationKind, ElementLoad, HeadModel, HeadSpec, HeadState, LinkageSpec, Mode, ModeKind, Peak, max_head_mass_kg,
+    AccelerationKind, ElementLoad, HeadModel, HeadSpec, LinkageSpec, MassLimit, Mode, ModeKind, Peak, stands_with_mass,
 };
 use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
-use crate::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, roll_pitch_yaw};
+use crate::geometry::{STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
 use crate::sensors::Lidar;
 use crate::spec::Source;
 use crate::study::StudyError;
@@ -23,8 +24,11 @@ pub struct SpringReport {
     pub stands: bool,
     /// The reason why it has none.
     pub falls_because: Option<String>,
-    /// Maximum mass of a head of this shape with a stable rest pose, kg; `None` if there is no limit.
+    /// Maximum mass of a head of this shape with a stable rest pose and a stress at rest below the yield stress, kg;
+    /// `None` if there is no limit, or the strength of the wire is not known.
     pub heaviest_head_kg: Option<f64>,
+    /// What happens to a heavier head.
+    pub heaviest_head_limit: Option<String>,
     /// Load on each element of the linkage at rest.
     pub bearings: Vec<ElementLoad>,
     /// Coil of a head on a single spring; `None` for a spring specified by stiffness.
@@ -54,12 +58,13 @@ pub struct CoilReport {
     pub axial_n_per_m: f64,
     /// Torsional stiffness, N m/rad.
     pub torsion_nm_per_rad: f64,
-    /// Compressive load, N, negative for tension: that at rest, or the weight of a head without a rest pose.
+    /// Compressive load, N, negative for tension: that at rest, or for a head without a rest pose the component of its
+    /// weight along the spring.
     pub load_n: f64,
     /// Stiffness matrix of the top end with a clamped foot, under that load; x, y, z, rx, ry, rz; `None` if the spring is
     /// beyond its limits.
     pub stiffness_at_top: Option<[[f64; 6]; 6]>,
-    /// Buckling load with a guided top, N; `None` if the spring does not buckle.
+    /// Buckling load with a guided top, N; `None` if the spring does not buckle or the load is a tension.
     pub buckling_load_n: Option<f64>,
     /// Buckling load divided by the load; `None` if the spring does not buckle or the load is a tension.
     pub buckling_margin: Option<f64>,
@@ -129,25 +134,19 @@ pub fn spring_report(
     lidar: &Lidar,
     plan: &CoveragePlan,
 ) -> Result<SpringReport, StudyError> {
-    let heaviest_head_kg = max_head_mass_kg(spec, source)?;
+    let heaviest = heaviest_head(spec, source)?;
     let head = match HeadModel::new(spec, source) {
         Ok(head) => head,
-        // Without a mass limit the rest pose always exists, so the error has another cause in the spec.
-        Err(error) if heaviest_head_kg.is_none() => return Err(error.into()),
-        // `heaviest_kg` has validated the spring, so the head has no stable rest pose.
-        Err(error) => return unstable_report(spec, heaviest_head_kg, error.to_string()),
+        // If a head of this mass has a rest pose, the error has another cause in the spec.
+        Err(error) if stands_with_mass(spec, source, 1.0)? => return Err(error.into()),
+        Err(error) => return unstable_report(spec, heaviest, error.to_string()),
     };
     if let Some(why) = head.rigid_mount_reason() {
         return Err(StudyError::Plan { what: "head", message: why.to_owned() });
     }
     let mass_kg = head.body().mass_kg;
-    let model = SpringModel::of(spec, &head)?;
-    let at_rest = HeadState {
-        t_s: 0.0,
-        head: Kinematics::at_rest(*head.base_from_head_at_rest()),
-        base: Kinematics::at_rest(Pose::identity()),
-    };
-    let stress_pa = model.stress_pa(&at_rest);
+    let model = SpringModel::of(spec, head.body())?;
+    let stress_pa = model.stress_pa(&at_rest(&head));
     let bearings = head.element_loads();
     let load_n = bearings.first().and_then(|spring| spring.load_n).unwrap_or(mass_kg * STANDARD_GRAVITY_M_PER_S2);
     let coil = coil_of(spec)?.map(|coil| coil_report(&coil, &model, load_n, stress_pa));
@@ -157,10 +156,11 @@ pub fn spring_report(
         head_mass_kg: mass_kg,
         stands: true,
         falls_because: None,
-        heaviest_head_kg,
+        heaviest_head_kg: heaviest.as_ref().map(|limit| limit.mass_kg),
+        heaviest_head_limit: heaviest.map(|limit| limit.reason),
         bearings,
         coil,
-        rest: Some(rest_report(&head, model.free_length_m.map(|_| model.sag_m(&head)))),
+        rest: Some(rest_report(&head, model.coil.map(|_| model.sag_m(&head)))),
         stiffness: head.linear().map(|linear| rows(&linear.stiffness)),
         modes: head.linear_modes().iter().map(mode_report).collect(),
         gain_peaks: AXES.map(peak).to_vec(),
@@ -169,33 +169,35 @@ pub fn spring_report(
 }
 
 /// The report on a head without a stable rest pose.
-fn unstable_report(
-    spec: &HeadSpec,
-    heaviest_head_kg: Option<f64>,
-    because: String,
-) -> Result<SpringReport, StudyError> {
+fn unstable_report(spec: &HeadSpec, heaviest: Option<MassLimit>, because: String) -> Result<SpringReport, StudyError> {
     use crate::dynamics::PartSpec::{Block, Body};
     let mass = spec.parts.iter().map(|part| match part {
         Block { mass_kg, .. } | Body { mass_kg, .. } => mass_kg,
     });
-    let head_mass_kg = mass.sum();
-    let model = match &spec.linkage {
-        LinkageSpec::Spring { spring, .. } => SpringModel {
-            wire: super::Wire::of(spring)?,
-            mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
-            ..SpringModel::without_mounting()
-        },
+    let head_mass_kg: f64 = mass.sum();
+    let weight = gravity_in_world() * head_mass_kg;
+    let (model, load_n) = match &spec.linkage {
+        LinkageSpec::Spring { spring, base_from_spring, .. } => {
+            let model = SpringModel {
+                wire: super::Wire::of(spring)?,
+                end_m: spring.end_length_m()?,
+                mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
+                ..SpringModel::without_mounting()
+            };
+            (model, -(base_from_spring.pose().rotation.inverse() * weight).z)
+        }
         LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } | LinkageSpec::Suspension { .. } => {
-            SpringModel::without_mounting()
+            (SpringModel::without_mounting(), weight.norm())
         }
     };
     Ok(SpringReport {
         head_mass_kg,
         stands: false,
         falls_because: Some(because),
-        heaviest_head_kg,
+        heaviest_head_kg: heaviest.as_ref().map(|limit| limit.mass_kg),
+        heaviest_head_limit: heaviest.map(|limit| limit.reason),
         bearings: Vec::new(),
-        coil: coil_of(spec)?.map(|coil| coil_report(&coil, &model, head_mass_kg * STANDARD_GRAVITY_M_PER_S2, None)),
+        coil: coil_of(spec)?.map(|coil| coil_report(&coil, &model, load_n, None)),
         rest: None,
         stiffness: None,
         modes: Vec::new(),
@@ -234,10 +236,10 @@ fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<
     let open_m = length_m - coil.solid_length_m();
     let (radius_m, wire_m) = model.wire.map_or((f64::NAN, f64::NAN), |w| (w.coil_radius_m, w.diameter_m));
     let coils = coil.solid_length_m() / wire_m;
-    let buckling = buckling_load_n(coil);
+    let buckling = buckling_load_n(coil).filter(|_| load_n > 0.0);
     let at_top = coil.under_load(load_n).and_then(|column| loaded_stiffness(&column)).ok();
     CoilReport {
-        free_length_mm: coil.free_length_m() * 1e3,
+        free_length_mm: (coil.free_length_m() + 2.0 * model.end_m) * 1e3,
         load_n,
         index: 2.0 * radius_m / wire_m,
         mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
@@ -245,7 +247,7 @@ fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<
         torsion_nm_per_rad: coil.torsion_nm_per_rad(),
         stiffness_at_top: at_top.as_ref().map(rows),
         buckling_load_n: buckling,
-        buckling_margin: buckling.filter(|_| load_n > 0.0).map(|buckling_n| buckling_n / load_n),
+        buckling_margin: buckling.map(|buckling_n| buckling_n / load_n),
         gap_mm: open_m / coils * 1e3,
         // Bending by phi reduces each of the n gaps by phi R / n on the inner side.
         clash_bend_deg: (open_m / radius_m).to_degrees(),

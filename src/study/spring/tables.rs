@@ -20,7 +20,10 @@ pub struct Property {
 /// Load, rest pose and limits.
 pub fn properties(report: &SpringReport) -> Vec<Property> {
     let mut rows = vec![row("head", format!("{:.3} kg", report.head_mass_kg))];
-    let heaviest = report.heaviest_head_kg.map_or("unlimited".to_owned(), |kg| format!("{kg:.3} kg"));
+    let heaviest = match (report.heaviest_head_kg, &report.heaviest_head_limit) {
+        (Some(kg), Some(limit)) => format!("{kg:.3} kg (above: {limit})"),
+        _ => "no limit by the rest pose; strength unknown".to_owned(),
+    };
     rows.push(row("stable rest pose", if report.stands { "yes" } else { "no" }.to_owned()));
     rows.push(row("maximum mass of this head", heaviest));
     rows.extend(report.rest.iter().flat_map(rest));
@@ -79,14 +82,20 @@ fn bearing(bearing: &ElementLoad) -> Property {
         ElementKind::Float => "buoyancy of a float",
         ElementKind::UniversalJoint => "load on a universal joint",
     };
-    row(name, bearing.load_n.map_or("remaining weight".to_owned(), |n| format!("{n:.2} N")))
+    let value = match (bearing.kind, bearing.load_n) {
+        (_, None) => "remaining weight".to_owned(),
+        (ElementKind::Spring, Some(n)) if n < 0.0 => format!("pulled by {:.2} N", -n),
+        (ElementKind::Spring, Some(n)) => format!("pressed by {n:.2} N"),
+        (_, Some(n)) => format!("{n:.2} N"),
+    };
+    row(name, value)
 }
 
 fn coil(coil: &CoilReport) -> Vec<Property> {
     let or_dash = |x: Option<f64>, unit: &str| x.map_or("-".to_owned(), |x| format!("{x:.1} {unit}"));
     let buckles = match (coil.buckling_load_n, coil.buckling_margin) {
         (Some(load_n), Some(margin)) => format!("{load_n:.1} N, {margin:.1} x the load (top cannot tilt)"),
-        (Some(load_n), None) => format!("{load_n:.1} N (the load is a tension)"),
+        _ if coil.load_n < 0.0 => "none: the head pulls the spring".to_owned(),
         _ => "does not buckle (top cannot tilt)".to_owned(),
     };
     let stress = match (coil.stress_at_rest_mpa, coil.yield_mpa) {

@@ -26,7 +26,36 @@ pub struct WireLoad {
 }
 
 /// Number of angles around the coil at which the stress is evaluated: the error of the maximum is at most 0.1 %.
-const ANGLES: usize = 72;
+pub(super) const ANGLES: usize = 72;
+
+/// Stress in a wire at one section, Pa: each entry is the largest over the section, with its sign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WireStress {
+    pub shear_pa: f64,
+    /// By the moment about the radial direction.
+    pub radial_bending_pa: f64,
+    /// By the moment about the axis of the coil.
+    pub axial_bending_pa: f64,
+    pub tension_pa: f64,
+}
+
+impl WireStress {
+    /// The von Mises stress, if all maxima occur at the same point of the section, which is conservative.
+    pub fn von_mises_pa(&self) -> f64 {
+        let bending = self.radial_bending_pa.hypot(self.axial_bending_pa);
+        (bending + self.tension_pa.abs()).hypot(3_f64.sqrt() * self.shear_pa)
+    }
+
+    /// The stress with each entry combined with that of another one.
+    pub fn zip(&self, other: &Self, combine: fn(f64, f64) -> f64) -> Self {
+        Self {
+            shear_pa: combine(self.shear_pa, other.shear_pa),
+            radial_bending_pa: combine(self.radial_bending_pa, other.radial_bending_pa),
+            axial_bending_pa: combine(self.axial_bending_pa, other.axial_bending_pa),
+            tension_pa: combine(self.tension_pa, other.tension_pa),
+        }
+    }
+}
 
 impl Wire {
     /// The wire of a spring specified as a coil; `None` for a spring specified by stiffness.
@@ -47,50 +76,44 @@ impl Wire {
         2.0 * self.coil_radius_m / self.diameter_m
     }
 
-    /// Maximum von Mises stress in the wire at a section, Pa.
+    /// Stress in the wire at a section, at angle `k` of [`ANGLES`] around the coil.
     ///
     /// At the angle with radial direction n, the force F and the moment `M - R n x F` act on the wire. Torsion about the
     /// tangent has the curvature factor `(4C - 1) / (4C - 4)`, plus 1.23 times the mean shear; for an axial force the sum
     /// is Wahl's factor (Wahl, Mechanical Springs, chapter 2). Bending about the coil axis has the factor of a curved
-    /// bar, `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle is assumed to be small. The maxima
-    /// of torsion and bending are assumed to occur at the same point, which is conservative.
-    pub fn equivalent_stress_pa(&self, section: &WireLoad) -> f64 {
+    /// bar, `(4C^2 - C - 1) / (4C (C - 1))`; bending about n has none. The pitch angle is assumed to be small.
+    pub(super) fn stress_at(&self, section: &WireLoad, k: usize) -> WireStress {
         let c = self.index();
         let (curved_torsion, curved_bending) =
             ((4.0 * c - 1.0) / (4.0 * c - 4.0), (4.0 * c * c - c - 1.0) / (4.0 * c * (c - 1.0)));
         let modulus = PI * self.diameter_m.powi(3) / 32.0;
         let area = 0.25 * PI * self.diameter_m.powi(2);
-        let at = |k: usize| {
-            let (sin, cos) = (TAU * k as f64 / ANGLES as f64).sin_cos();
-            let (outward, along) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
-            let moment = section.moment - (outward * self.coil_radius_m).cross(&section.force);
-            let across = section.force - along * section.force.dot(&along);
-            let shear = 0.5 * moment.dot(&along).abs() / modulus * curved_torsion + 1.23 * across.norm() / area;
-            let bending = (moment.dot(&outward)).hypot(moment.z * curved_bending) / modulus;
-            (bending + section.force.dot(&along).abs() / area).hypot(3_f64.sqrt() * shear)
-        };
-        (0..ANGLES).map(at).fold(0.0, f64::max)
+        let (sin, cos) = (TAU * k as f64 / ANGLES as f64).sin_cos();
+        let (outward, along) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
+        let moment = section.moment - (outward * self.coil_radius_m).cross(&section.force);
+        let tension = section.force.dot(&along);
+        let across = section.force - along * tension;
+        let torsion = 0.5 * moment.dot(&along) / modulus * curved_torsion;
+        WireStress {
+            shear_pa: torsion + torsion.signum() * 1.23 * across.norm() / area,
+            radial_bending_pa: moment.dot(&outward) / modulus,
+            axial_bending_pa: moment.z * curved_bending / modulus,
+            tension_pa: tension / area,
+        }
     }
 
-    /// Yield stress of the wire, Pa; `None` for a material specified by its moduli only.
-    ///
-    /// The tensile strength is `A / d^m`. The allowable torsional stress is 45 % of it for music wire and 35 % for
-    /// stainless 302 (Shigley's Mechanical Engineering Design, 9th edition, tables 10-4 and 10-6). The von Mises
-    /// criterion gives the tensile yield stress: sqrt(3) times the torsional stress.
+    /// Maximum von Mises stress in the wire at a section, Pa.
+    pub fn equivalent_stress_pa(&self, section: &WireLoad) -> f64 {
+        (0..ANGLES).map(|k| self.stress_at(section, k).von_mises_pa()).fold(0.0, f64::max)
+    }
+
+    /// Yield stress of the wire, Pa; `None` if unknown.
     pub fn yield_pa(&self) -> Option<f64> {
-        let wire_mm = self.diameter_m * 1e3;
-        let (strength_mpa, exponent, torsion_ratio) = match self.material {
-            Material::SpringSteel => (2211.0, 0.145, 0.45),
-            Material::Stainless if wire_mm <= 2.5 => (1867.0, 0.146, 0.35),
-            Material::Stainless if wire_mm <= 5.0 => (2065.0, 0.263, 0.35),
-            Material::Stainless => (2911.0, 0.478, 0.35),
-            Material::Moduli { .. } => return None,
-        };
-        Some(3_f64.sqrt() * torsion_ratio * 1e6 * strength_mpa / f64::powf(wire_mm, exponent))
+        self.material.yield_pa(self.diameter_m)
     }
 }
 
-/// Attachments of a spring, and the body that it carries.
+/// Ends of the active coils of a spring in their attachments, and the body that it carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpringMounting {
     base_from_foot: Pose,
@@ -101,8 +124,13 @@ pub struct SpringMounting {
 impl SpringMounting {
     /// The mounting of a head on a single spring; `None` for other linkages.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
-        let LinkageSpec::Spring { base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
-        Some(Self { base_from_foot: base_from_spring.pose(), head_from_top: head_from_spring.pose(), body: *body })
+        let LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
+        let end = Pose::translation(0.0, 0.0, spring.end_length_m().ok()?);
+        Some(Self {
+            base_from_foot: base_from_spring.pose() * end,
+            head_from_top: head_from_spring.pose() * end.inverse(),
+            body: *body,
+        })
     }
 
     /// Distance from foot to top with the head at a pose, m.

@@ -4,14 +4,20 @@
 //! form, in less than 1 ms. A catalogue is evaluated exhaustively. A geometry is sampled uniformly first; then several
 //! runs of CMA-ES (Hansen 2016, crate `cmaes`) minimise the goals with different weights. The scalarisation is that of
 //! Chebyshev, which also finds concave fronts. The Pareto set is taken from all evaluated designs; an evenly distributed
-//! selection of it is verified by full simulations.
+//! selection of it is verified by full simulations. Designs that cannot be made, clash or break are rejected.
 
 mod catalogue;
+mod evaluation;
+mod limits;
+mod optimise;
 mod output;
 mod search;
+mod space;
 mod spec;
 
 pub use catalogue::{STOCK, catalogue};
-pub use output::{csv, pareto_figure};
-pub use search::{Candidate, DesignSearch, DesignStudy, VerifiedDesign};
+pub use evaluation::Candidate;
+pub use limits::{BuildLimitsSpec, Violation, WireStock};
+pub use output::{csv, pareto_figure, rejected_csv};
+pub use search::{DesignSearch, DesignStudy, Exploration, Rejection, VerifiedDesign};
 pub use spec::{CoilDesign, DesignSpec, SpaceSpec};

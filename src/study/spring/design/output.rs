@@ -1,7 +1,8 @@
 //! Result of a search as CSV and as a plot.
 
-use super::{DesignStudy, VerifiedDesign};
-use crate::elasticity::Material;
+use super::search::{DesignStudy, VerifiedDesign};
+use super::spec::CoilDesign;
+use crate::elasticity::{EndsSpec, Material};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
 use crate::study::spring::DesignMetrics;
 use crate::study::sweep::Measure;
@@ -20,17 +21,18 @@ const METRICS: [Measure; 7] = [
 
 /// Formats the verified designs as CSV.
 ///
-/// The columns are the coil, the metrics in closed form and by simulation (`simulated_...`), and whether the simulated
-/// metrics are within the limits.
+/// The columns are the coil, the metrics in closed form and by simulation (`simulated_...`), and the
+/// margins of the simulation.
 pub fn csv(study: &DesignStudy) -> String {
-    let mut text = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material".to_owned();
+    let mut text = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,ends,material".to_owned();
     for prefix in ["", "simulated_"] {
         for name in METRICS.map(Measure::key) {
             // Writing to a string cannot fail.
             let _ = write!(text, ",{prefix}{name}");
         }
     }
-    text.push_str(",fraction_seen,saturated,holds\n");
+    text.push_str(",fraction_seen,saturated");
+    text.push_str(",clash_margin,gap_mm,solid_margin,buckling_margin,yield_margin,fatigue_margin\n");
     for verified in &study.candidates {
         line(&mut text, verified);
     }
@@ -38,26 +40,54 @@ pub fn csv(study: &DesignStudy) -> String {
 }
 
 fn line(text: &mut String, verified: &VerifiedDesign) {
-    let coil = &verified.candidate.coil;
+    text.push_str(&coil_columns(&verified.candidate.coil));
+    let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:.5}"));
+    for metrics in [&verified.candidate.figures, &verified.simulated] {
+        for metric in METRICS {
+            let _ = write!(text, ",{}", number(metrics.figure(metric)));
+        }
+    }
+    let _ = write!(text, ",{:.5},{:.5}", verified.fraction_seen, verified.saturated);
+    let margins = &verified.simulated.margins;
+    let of_simulation = [margins.clash, margins.gap_mm, margins.solid, margins.buckling, margins.yielding];
+    for margin in of_simulation.into_iter().chain([verified.fatigue_margin]) {
+        let _ = write!(text, ",{}", number(margin));
+    }
+    text.push('\n');
+}
+
+fn coil_columns(coil: &CoilDesign) -> String {
     let material = match coil.material {
         Material::SpringSteel => "spring_steel",
         Material::Stainless => "stainless",
         Material::Moduli { .. } => "moduli",
     };
-    let _ = write!(
-        text,
-        "{},{:.4},{:.4},{:.4},{:.4},{material}",
+    let ends = match coil.ends {
+        EndsSpec::ActiveOnly => "active_only",
+        EndsSpec::Open => "open",
+        EndsSpec::Closed => "closed",
+        EndsSpec::ClosedGround => "closed_ground",
+    };
+    format!(
+        "{},{:.4},{:.4},{:.4},{:.4},{ends},{material}",
         coil.name, coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
-    );
-    let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:.5}"));
-    let value =
-        |metrics: Option<&DesignMetrics>, metric: Measure| number(metrics.and_then(|metrics| metrics.figure(metric)));
-    for metrics in [Some(&verified.candidate.figures), verified.simulated.as_ref()] {
-        for metric in METRICS {
-            let _ = write!(text, ",{}", value(metrics, metric));
-        }
+    )
+}
+
+/// Formats the rejected springs of a catalogue, and the designs that the simulation rejected, as CSV.
+///
+/// The columns are the coil, whether the closed form or the simulation rejected it, and the limit with the largest
+/// violation with its value, if that is known.
+pub fn rejected_csv(study: &DesignStudy) -> String {
+    let mut text =
+        "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,ends,material,by,limit,value\n".to_owned();
+    for rejection in &study.rejections {
+        let by = if rejection.simulated { "simulation" } else { "closed_form" };
+        let value = rejection.value.map_or(String::new(), |x| format!("{x:.5}"));
+        let limit = rejection.limit.replace([',', '\n'], ";");
+        let _ = writeln!(text, "{},{by},{limit},{value}", coil_columns(&rejection.coil));
     }
-    let _ = writeln!(text, ",{},{},{}", number(verified.fraction_seen), number(verified.saturated), verified.holds);
+    text
 }
 
 /// Plots the metrics of the first two goals: all feasible designs, and the verified ones in closed form and simulated.
@@ -68,7 +98,7 @@ pub fn pareto_figure(study: &DesignStudy) -> Figure {
     let at = |metrics: &DesignMetrics| (shown(metrics, x), shown(metrics, y));
     let cloud = study.cloud.iter().map(|(a, b)| (a * x.unit().1, b * y.unit().1)).collect();
     let closed = study.candidates.iter().map(|v| at(&v.candidate.figures)).collect();
-    let simulated = study.candidates.iter().filter_map(|v| v.simulated.as_ref().map(at)).collect();
+    let simulated = study.candidates.iter().map(|v| at(&v.simulated)).collect();
     let chart = Chart::new("Pareto set of the springs within limits", x.label(), y.label())
         .with(Series::dots("feasible", Colour::Backdrop, cloud).marked(Mark::Dots(1.5)))
         .with(Series::dots("Pareto set, closed form", Colour::Estimate, closed).marked(Mark::Dots(5.0)))

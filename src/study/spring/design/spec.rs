@@ -1,9 +1,10 @@
 //! Spec of a spring search: `specs/studies/NAME.ron`.
 
-use super::super::Shake;
-use crate::elasticity::{Material, SpringSpec};
+use super::super::{Shake, StressCycle, Wire};
+use super::limits::BuildLimitsSpec;
+use crate::elasticity::{EndsSpec, Material, SpringSpec};
 use crate::spec::checked;
-use crate::study::sweep::{GoalSpec, MeasureLimitSpec};
+use crate::study::sweep::{GoalSpec, Measure, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
 
 /// A search for a spring: design space, goals and limits.
@@ -23,12 +24,32 @@ pub struct DesignSpec {
     /// Limits of feasible designs; a design without a stable rest pose of the head is always infeasible.
     #[serde(default)]
     pub limits: Vec<MeasureLimitSpec>,
+    /// Limits of a spring that can be ordered and lasts; each has a default.
+    #[serde(default)]
+    pub build: BuildLimitsSpec,
     /// Number of designs to evaluate; a catalogue is always evaluated completely.
     pub evaluations: usize,
     /// Number of designs of the Pareto set that are verified by simulation and reported.
     pub candidates: usize,
     /// Random seed.
     pub seed: u64,
+}
+
+impl DesignSpec {
+    /// The limits that cannot be checked for a wire, because its strengths are unknown.
+    pub fn unchecked(&self, wire: &Wire) -> Vec<&'static str> {
+        let unit = StressCycle { amplitude_pa: 1.0, mean_pa: 1.0 };
+        let has_stress_limit = self.limits.iter().any(|limit| limit.measure == Measure::StressShare);
+        let mut unchecked = Vec::new();
+        if wire.yield_pa().is_none() {
+            unchecked.push("yield_margin");
+            unchecked.extend(has_stress_limit.then_some("stress_share"));
+        }
+        if wire.fatigue_margin(&unit, f64::INFINITY).is_none() {
+            unchecked.push("fatigue_margin");
+        }
+        unchecked
+    }
 }
 
 /// Design space of a spring search.
@@ -49,6 +70,9 @@ pub enum SpaceSpec {
         /// Free length, minimum and maximum, mm.
         #[serde(with = "checked::PositiveArray::<2>")]
         free_length_mm: [f64; 2],
+        /// Ends of the springs, a part of the free length.
+        #[serde(default)]
+        ends: EndsSpec,
         /// Material of the wire.
         material: Material,
     },
@@ -69,11 +93,23 @@ pub struct CoilDesign {
     pub active_coils: f64,
     /// Free length, mm.
     pub free_length_mm: f64,
+    /// Ends of the spring.
+    pub ends: EndsSpec,
     /// Material of the wire.
     pub material: Material,
 }
 
 impl CoilDesign {
+    /// The name in the catalogue, or mean diameter x wire diameter x active coils x free length, mm.
+    pub fn label(&self) -> String {
+        if self.name.is_empty() {
+            let Self { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, .. } = self;
+            format!("{coil_diameter_mm:.1}x{wire_diameter_mm:.2}x{active_coils:.1}x{free_length_mm:.1}")
+        } else {
+            self.name.clone()
+        }
+    }
+
     /// The spec of the spring.
     pub fn spring(&self) -> SpringSpec {
         SpringSpec::Coil {
@@ -81,6 +117,7 @@ impl CoilDesign {
             wire_diameter_mm: self.wire_diameter_mm,
             active_coils: self.active_coils,
             free_length_mm: self.free_length_mm,
+            ends: self.ends,
             material: self.material,
         }
     }

@@ -1,0 +1,100 @@
+//! Evaluation of a design in closed form: metrics, costs and violated limits.
+
+use super::limits::Violation;
+use super::spec::{CoilDesign, DesignSpec};
+use crate::dynamics::{HeadSpec, LinkageSpec, stands_with_mass};
+use crate::spec::Source;
+use crate::study::spring::{DesignMetrics, closed_form};
+use serde::Serialize;
+
+/// A feasible design.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Candidate {
+    /// The coil.
+    pub coil: CoilDesign,
+    /// Metrics in closed form.
+    pub figures: DesignMetrics,
+    /// Cost for each goal; lower is better.
+    pub costs: Vec<f64>,
+}
+
+/// Evaluation of a design.
+pub(super) enum Evaluation {
+    /// Within all limits.
+    Feasible(Box<Candidate>),
+    /// Outside these limits.
+    Infeasible(Vec<Violation>),
+    /// There are no metrics, for this reason.
+    Invalid(&'static str),
+}
+
+impl Evaluation {
+    /// The limit with the largest violation, or the reason why there are no metrics; `None` for a feasible design.
+    pub fn rejected_by(&self) -> Option<&'static str> {
+        match self {
+            Evaluation::Feasible(_) => None,
+            Evaluation::Infeasible(violations) => {
+                violations.iter().max_by(|a, b| a.excess.total_cmp(&b.excess)).map(|violation| violation.limit)
+            }
+            Evaluation::Invalid(reason) => Some(reason),
+        }
+    }
+}
+
+/// A head, a shake, goals and limits, with which designs are evaluated.
+pub(super) struct Evaluator {
+    pub spec: DesignSpec,
+    pub head: HeadSpec,
+    pub source: Source,
+}
+
+impl Evaluator {
+    /// Evaluates a coil in closed form.
+    pub fn evaluate(&self, coil: &CoilDesign) -> Evaluation {
+        if coil.spring().design().is_err() {
+            return Evaluation::Invalid("geometry");
+        }
+        let head = self.head_on(coil);
+        let Ok(figures) = closed_form(&head, &self.source, &self.spec.shake) else {
+            return Evaluation::Invalid("stable rest pose");
+        };
+        let mut violations = self.violations(coil, &figures);
+        let unknown = self.spec.goals.iter().filter(|goal| figures.figure(goal.measure).is_none());
+        violations.extend(unknown.map(|goal| Violation { limit: goal.measure.key(), value: None, excess: 1.0 }));
+        // The tipping margin takes as long as all others, so it is the last.
+        if violations.is_empty() && !self.keeps_tipping_margin(&head) {
+            violations.push(Violation { limit: "tipping_margin", value: None, excess: 0.05 });
+        }
+        if !violations.is_empty() {
+            return Evaluation::Infeasible(violations);
+        }
+        let costs = self.spec.goals.iter().map(|goal| goal.cost(figures.cost_figure(goal.measure))).collect();
+        Evaluation::Feasible(Box::new(Candidate { coil: coil.clone(), figures, costs }))
+    }
+
+    fn keeps_tipping_margin(&self, head: &HeadSpec) -> bool {
+        stands_with_mass(head, &self.source, self.spec.build.tipping_margin).unwrap_or(false)
+    }
+
+    /// The violated limits, except the tipping margin.
+    ///
+    /// A measure that is not known is no violation.
+    pub fn violations(&self, coil: &CoilDesign, metrics: &DesignMetrics) -> Vec<Violation> {
+        let of_measures = self.spec.limits.iter().filter_map(|limit| {
+            let value = metrics.figure(limit.measure)?;
+            let excess = limit.excess(value);
+            (excess > 0.0).then(|| Violation { limit: limit.measure.key(), value: Some(value), excess })
+        });
+        let shake_hz = self.spec.shake.frequency_hz.unwrap_or(metrics.rocking_hz);
+        of_measures.chain(self.spec.build.violations(&coil.spring(), metrics, shake_hz)).collect()
+    }
+
+    /// The head on the spring.
+    pub fn head_on(&self, coil: &CoilDesign) -> HeadSpec {
+        let mut head = self.head.clone();
+        if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
+            *spring = coil.spring();
+        }
+        head
+    }
+}
