@@ -7,14 +7,18 @@ use super::recording_files::RecordingFiles;
 use super::{output, recording_size};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use zsim::recording::write_rosbag2_metadata;
 use zsim::report;
 use zsim::simulation::{Simulation, SimulationSummary};
 use zsim::study::{self, ProgressMonitor};
 
 /// Simulate and record: an MCAP file with the truth inside, and the true trajectory next to it as a TUM file
 #[derive(Args)]
-#[command(after_help = "Example:\n  zsim simulate --scene office --duration 2min --out office.mcap")]
+#[command(
+    after_help = "Examples:\n  zsim simulate --scene office --duration 2min --out office.mcap\n  zsim simulate --scene \
+                        office --rosbag2 office"
+)]
 pub(super) struct Arguments {
     /// The world, a name under scenes/ or a file
     #[arg(long, value_name = "NAME|FILE")]
@@ -24,6 +28,9 @@ pub(super) struct Arguments {
     /// The recording; if it or the .tum file next to it exists, a number is added to both names [default: <scene>.mcap]
     #[arg(long, short, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
+    /// Write the recording into this new folder as rosbag2 does, with metadata.yaml, for `ros2 bag play DIR`
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force"])]
+    rosbag2: Option<PathBuf>,
     /// Replace the recording and the .tum file, once the new ones are complete
     #[arg(long)]
     force: bool,
@@ -36,7 +43,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let simulation = Simulation::prepare(&arguments.scenario.scenario(&arguments.scene))?;
     let default = || PathBuf::from(format!("{}.mcap", simulation.world().name()));
     let inputs = arguments.scenario.inputs(&arguments.scene);
-    let wanted = arguments.out.clone().unwrap_or_else(default);
+    let folder = arguments.rosbag2.as_ref().map(|folder| output::folder(folder, false)).transpose()?;
+    let wanted = match &folder {
+        Some(folder) => folder.join(rosbag2_file(folder)),
+        None => arguments.out.clone().unwrap_or_else(default),
+    };
     let mut bars = Bars::new(global);
     recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
     let files = RecordingFiles::reserve(&wanted, arguments.force, &inputs)?;
@@ -48,14 +59,22 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let summary = recorded.inspect_err(|_| super::full_run::print_partial_results(files.recording()))?;
     let (recording, truth) = files.finish()?;
 
+    if folder.is_some() {
+        write_rosbag2_metadata(&recording)?;
+    }
     let mut figures = serde_json::to_value(summary)?;
     if let Some(object) = figures.as_object_mut() {
         object.insert("scene".to_owned(), json!(simulation.world().name()));
         object.insert("seed".to_owned(), json!(simulation.inputs().seed));
         object.insert("truth".to_owned(), json!(truth.display().to_string()));
     }
-    output::print_result(global, &text(&summary), figures, Some(&recording))?;
+    output::print_result(global, &text(&summary), figures, Some(folder.as_deref().unwrap_or(&recording)))?;
     Ok(Completion::Done)
+}
+
+/// Name of the file in a folder of rosbag2: that of the folder, with the number 0.
+fn rosbag2_file(folder: &Path) -> String {
+    format!("{}_0.mcap", folder.file_name().unwrap_or_default().to_string_lossy())
 }
 
 fn text(summary: &SimulationSummary) -> String {

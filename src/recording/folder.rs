@@ -13,7 +13,7 @@ const EXTENSIONS: [&str; 3] = ["mcap", "db3", "bag"];
 const COMPRESSED_EXTENSION: &str = "zstd";
 
 /// Metadata file that rosbag2 writes into the folder.
-const METADATA_FILE: &str = "metadata.yaml";
+pub const METADATA_FILE: &str = "metadata.yaml";
 
 /// Maximum length of `metadata.yaml`, bytes; quality-of-service settings dominate it.
 const MAX_METADATA_BYTES: u64 = 16 << 20;

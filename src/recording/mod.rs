@@ -20,7 +20,7 @@
 //!
 //! [`TumWriter`] and [`read_tum`] handle trajectories, [`PlyWriter`], [`PlyReader`] and [`LasWriter`] point clouds,
 //! [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`write_result`] writes an estimate as a recording for
-//! viewers.
+//! viewers, [`write_rosbag2_metadata`] the metadata of a folder of rosbag2.
 
 mod base_imu;
 mod cloud;
@@ -41,6 +41,7 @@ mod ply;
 mod poses;
 mod reader;
 mod result;
+mod rosbag2;
 mod schema;
 mod selection;
 mod stamp_sorter;
@@ -62,6 +63,7 @@ pub use measurements::Measurements;
 pub use ply::{PlyReader, PlyWriter};
 pub use reader::Reader;
 pub use result::write_result;
+pub use rosbag2::write_rosbag2_metadata;
 pub use selection::{Selection, TopicPreference};
 pub use truth::{Truth, TruthReader};
 pub use tum::{TumWriter, parse_tum, read_tum, write_tum};

@@ -69,6 +69,26 @@ impl Topic {
     /// Number of topics.
     pub const COUNT: usize = 13;
 
+    /// The topic of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        let all: [Self; Self::COUNT] = [
+            Self::Scan,
+            Self::Points,
+            Self::Imu,
+            Self::BaseImu,
+            Self::TfStatic,
+            Self::Tf,
+            Self::TruthOdometry,
+            Self::TruthPose,
+            Self::TruthBase,
+            Self::TruthClock,
+            Self::Path,
+            Self::Cloud,
+            Self::Pose,
+        ];
+        all.into_iter().find(|topic| topic.name() == name)
+    }
+
     /// Topic name.
     pub fn name(self) -> &'static str {
         match self {

@@ -4,7 +4,7 @@ use crate::skip::{run_or_skip, skip};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use zsim::geometry::Pose;
-use zsim::recording::{BaseImuDescription, RunDescription};
+use zsim::recording::{BaseImuDescription, RunDescription, write_rosbag2_metadata};
 
 /// A recording with messages on every topic.
 fn recording_in(folder: &Path) -> PathBuf {
@@ -40,6 +40,20 @@ fn read_by_others(name: &str, folder: &Path) -> Option<PathBuf> {
 fn mcap_for_python_and_rosbags_agree_on_every_message() {
     let folder = tempfile::tempdir().unwrap();
     read_by_others("mcap", folder.path());
+}
+
+#[test]
+fn rosbags_reads_a_folder_with_our_metadata() {
+    let folder = tempfile::tempdir().unwrap();
+    write_rosbag2_metadata(&recording_in(folder.path())).unwrap();
+    let script = here("tests/check_rosbag2.py");
+    let Some(output) = run_or_skip("rosbag2", python().arg(script).arg(folder.path())) else { return };
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success() && stdout.starts_with("ok "),
+        "{stdout}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
 }
 
 #[test]
