@@ -1,16 +1,15 @@
 //! `zsim evaluate`: errors of a trajectory and of a cloud.
 
 use super::arguments::Global;
-use super::{Completion, output};
-use anyhow::{Context, bail, ensure};
+use super::{Completion, output, trajectory_file};
+use anyhow::Context;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
-use zsim::evaluation::{CloudErrors, Errors, Pairs, Thinning, drift, relative_error};
+use zsim::evaluation::{CloudErrors, Pairs, Thinning, TrajectoryErrors};
 use zsim::geometry::{Pose, SmoothCursor, Trajectory, Vector};
-use zsim::recording::{PlyReader, read_tum};
+use zsim::recording::PlyReader;
 use zsim::report;
-use zsim::time::Span;
 use zsim::world::World;
 
 /// Maximum number of points of a cloud that are evaluated.
@@ -18,12 +17,10 @@ const MAX_EVALUATED_POINTS: usize = 200_000;
 /// Search radius around a point for the true surface, m.
 const REACH_M: f64 = 1.0;
 
-/// Maximum coordinate of a position, m; sums of squares of larger values could overflow.
-const MAX_COORDINATE_M: f64 = 1e12;
-
 /// Evaluate a trajectory against the true trajectory, and a cloud against the true surfaces
 ///
-/// Trajectories are TUM files (`t x y z qx qy qz qw`) with stamps of the same clock. The estimate is aligned with the
+/// Trajectories are TUM files (`t x y z qx qy qz qw`) with stamps of the same clock; the true one can also be the
+/// recording of `zsim simulate`. The estimate is aligned with the
 /// truth (rigid, by positions, as evo_ape -a). The same alignment is applied to a cloud in the map frame of the
 /// estimate; without trajectories, the cloud is in the world frame.
 #[derive(Args)]
@@ -36,8 +33,8 @@ pub(super) struct Arguments {
     /// The estimated trajectory
     #[arg(long, value_name = "A.tum", requires = "truth")]
     estimate: Option<PathBuf>,
-    /// The true trajectory
-    #[arg(long, value_name = "B.tum", requires = "estimate")]
+    /// The true trajectory, or a recording with the ground truth
+    #[arg(long, value_name = "B.tum|FILE.mcap", requires = "estimate")]
     truth: Option<PathBuf>,
     /// The cloud
     #[arg(long, value_name = "C.ply", requires = "scene")]
@@ -51,15 +48,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut metrics = Map::new();
     let mut estimated = None;
     if let (Some(estimated_path), Some(truth)) = (&arguments.estimate, &arguments.truth) {
-        let estimate = read_tum(estimated_path)?;
-        let known = read_tum(truth)?;
-        for (path, trajectory) in [(estimated_path, &estimate), (truth, &known)] {
-            check_positions(path, trajectory)?;
-        }
+        let estimate = trajectory_file::estimate(estimated_path)?;
+        let known = trajectory_file::truth(truth)?;
         let pairs = Pairs::associate(&estimate, &known)?;
-        let world_from_map = pairs.world_from_map()?;
-        evaluate_trajectory(&pairs, &world_from_map, &mut metrics)?;
-        estimated = Some((estimate, world_from_map));
+        let (errors, _) = TrajectoryErrors::of(&pairs, &known)?;
+        metrics = report::trajectory_figures(&errors);
+        estimated = Some((estimate, pairs.world_from_map()?));
     }
     if let (Some(cloud), Some(scene)) = (&arguments.cloud, &arguments.scene) {
         let world = World::load(scene)?;
@@ -67,39 +61,6 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
     output::print_result(global, &text(&metrics), Value::Object(metrics), None)?;
     Ok(Completion::Done)
-}
-
-/// Rejects positions that are too large for the evaluation.
-fn check_positions(path: &Path, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let out_of_range = trajectory.iter().find(|(_, pose)| pose.translation.vector.amax() > MAX_COORDINATE_M);
-    let Some((stamp, pose)) = out_of_range else { return Ok(()) };
-    bail!(
-        "{}: the pose at t = {:.9} s has a coordinate of {:e} m (maximum {MAX_COORDINATE_M:e} m): is the file in another format?",
-        path.display(),
-        stamp.nanos() as f64 * 1e-9,
-        pose.translation.vector.amax()
-    );
-}
-
-fn evaluate_trajectory(pairs: &Pairs, world_from_map: &Pose, metrics: &mut Map<String, Value>) -> anyhow::Result<()> {
-    let errors = Errors::after(pairs, world_from_map);
-    let drift_rate = drift(pairs).ok();
-    let relative = relative_error(pairs, Span::from_seconds(60.0)).ok();
-    let mut insert = |key: &str, value: Option<f64>| metrics.insert(key.to_owned(), json!(value));
-    insert("duration_s", Some(pairs.duration_s()));
-    ensure!(
-        errors.position_rmse_m().is_finite() && errors.rotation_rmse_rad().is_finite(),
-        "the errors of the estimate are not finite"
-    );
-    insert("position_rmse_m", Some(errors.position_rmse_m()));
-    insert("rotation_rmse_deg", Some(errors.rotation_rmse_rad().to_degrees()));
-    insert("drift_m_per_min", drift_rate.map(|drift| drift.position_m_per_min));
-    insert("yaw_drift_deg_per_min", drift_rate.map(|drift| drift.yaw_rad_per_min.to_degrees()));
-    insert("end_error_m", drift_rate.map(|drift| drift.end_error_m));
-    insert("relative_error_per_minute_m", relative.map(|error| error.position_rmse_m));
-    insert("relative_error_per_minute_deg", relative.map(|error| error.rotation_rmse_rad.to_degrees()));
-    metrics.insert("poses".to_owned(), json!(pairs.len()));
-    Ok(())
 }
 
 fn evaluate_cloud(

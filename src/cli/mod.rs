@@ -8,6 +8,7 @@ mod bars;
 mod base;
 mod bound;
 mod check;
+mod compare;
 mod completion;
 mod completions;
 mod coverage;
@@ -19,6 +20,7 @@ mod full_run;
 mod gains;
 mod info;
 mod latency;
+mod limit;
 mod live;
 mod man;
 mod map;
@@ -38,6 +40,7 @@ mod spring_text;
 mod study;
 mod sweep;
 mod sweep_text;
+mod trajectory_file;
 mod usage;
 
 use arguments::Global;
@@ -72,6 +75,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Estimate(estimate::Arguments),
     Evaluate(evaluate::Arguments),
+    Compare(compare::Arguments),
     Base(base::Arguments),
     Bound(bound::Arguments),
     Gains(gains::Arguments),
@@ -119,6 +123,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Simulate(arguments) => simulate::run(arguments, global),
         Command::Estimate(arguments) => estimate::run(arguments, global),
         Command::Evaluate(arguments) => evaluate::run(arguments, global),
+        Command::Compare(arguments) => compare::run(arguments, global),
         Command::Base(arguments) => base::run(arguments, global),
         Command::Bound(arguments) => bound::run(arguments, global),
         Command::Gains(arguments) => gains::run(arguments, global),

@@ -28,6 +28,17 @@ pub enum EvaluationError {
         /// Actual length, s.
         found_s: f64,
     },
+    /// The path is too short for a relative error over a length.
+    #[error("the relative error needs {needed_m} m of path, and there are {found_m:.3} m")]
+    PathTooShort {
+        /// Required length, m.
+        needed_m: f64,
+        /// Actual length, m.
+        found_m: f64,
+    },
+    /// Sums over the poses overflow.
+    #[error("the errors of the estimate are not finite: check the unit of its positions")]
+    NotFinite,
     /// The trajectory is too long for the measure.
     #[error(
         "{measure} is limited to {limit_s} s of trajectory, and there are {found_s:.0} s; use a part of the recording"

@@ -2,7 +2,8 @@
 //!
 //! A trajectory is compared by pairs of poses of equal time ([`Pairs`]), after a rigid alignment by their positions
 //! ([`align`], Umeyama without scale, as `evo_ape -a`): the absolute errors over time ([`Errors`]), the drift after an
-//! alignment over the first seconds only ([`drift()`]), the error of the motion within a minute ([`relative_error`]).
+//! alignment over the first seconds only ([`drift()`]), the error of the motion within a time or a length of the path
+//! ([`relative_error`], [`relative_error_over_path`]). [`TrajectoryErrors`] has all of them.
 //! [`clock_error`] compares clock offsets, [`CloudErrors`] the distances of a cloud to the true surfaces, or to those of
 //! another cloud ([`ReferenceCloud`]). For
 //! comparison there are the dead reckoning of the raw IMU ([`DeadReckoning`]) and the smallest error that the
@@ -22,6 +23,7 @@ mod error;
 mod pairs;
 mod reference_cloud;
 mod relative;
+mod trajectory_errors;
 
 pub use absolute::Errors;
 pub use alignment::{align, align_poses};
@@ -34,4 +36,5 @@ pub use drift::{Drift, TAIL_S, drift};
 pub use error::EvaluationError;
 pub use pairs::{Pairs, PoseSampler};
 pub use reference_cloud::ReferenceCloud;
-pub use relative::{RelativeError, relative_error};
+pub use relative::{RelativeError, relative_error, relative_error_over_path};
+pub use trajectory_errors::TrajectoryErrors;

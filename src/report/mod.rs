@@ -3,6 +3,7 @@
 //! This module formats results; it does not compute them.
 
 mod brief;
+mod comparison;
 mod figures;
 mod integrity;
 mod metrics;
@@ -18,6 +19,9 @@ mod verdict;
 mod wrap;
 
 pub use brief::brief;
+pub use comparison::{
+    compared_errors, compared_trajectories, comparison_details, comparison_table, trajectory_figures,
+};
 pub use figures::{
     LengthUnit, bound_over_time, clock_offset, errors_over_time, head_pitch, open_and_closed_loop_errors,
     trajectory_views,

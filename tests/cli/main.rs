@@ -5,6 +5,7 @@
 #[path = "../command/mod.rs"]
 mod command;
 mod commands;
+mod compare;
 mod documents;
 mod examples;
 mod gains;

@@ -39,6 +39,7 @@ fn tables_fit_a_terminal_and_pipes_get_no_escapes() {
         "bound a.mcap",
         "base estimated/open_loop.tum --head handheld --out base",
         "evaluate --estimate estimated/open_loop.tum --truth a.tum",
+        "compare --truth a.mcap estimated/open_loop.tum estimated/closed_loop.tum --out compared --verbose",
         "gains --period 10 --up-to 3 --realisations 2 --swing 2 --out gains",
         "coverage --duration 5s",
         "spring handheld",

@@ -3,7 +3,7 @@
 use crate::skip::run_or_skip;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use zsim::evaluation::{Errors, Pairs};
+use zsim::evaluation::{Errors, Pairs, relative_error, relative_error_over_path};
 use zsim::geometry::{Pose, Rotation, Trajectory, Vector};
 use zsim::time::{Span, Stamp};
 
@@ -49,9 +49,33 @@ fn errors_agree_with_evo_if_it_is_installed() {
     let (truth, estimate) = (folder.path().join("truth.tum"), folder.path().join("estimate.tum"));
     std::fs::write(&truth, walk(0.0)).unwrap();
     std::fs::write(&estimate, walk(1.0)).unwrap();
-    let Some(position) = evo(&truth, &estimate, "trans_part") else { return };
-    let rotation = evo(&truth, &estimate, "angle_deg").unwrap();
+    let Some(position) = evo_ape(&truth, &estimate, "trans_part") else { return };
+    let rotation = evo_ape(&truth, &estimate, "angle_deg").unwrap();
     assert_agree(ours(&truth, &estimate), [position, rotation]);
+}
+
+#[test]
+fn relative_errors_agree_with_evo_if_it_is_installed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (truth, estimate) = (folder.path().join("truth.tum"), folder.path().join("estimate.tum"));
+    std::fs::write(&truth, walk(0.0)).unwrap();
+    std::fs::write(&estimate, walk(1.0)).unwrap();
+    let pairs = Pairs::associate(&tum(&estimate), &tum(&truth)).unwrap();
+    let per_metre = relative_error_over_path(&pairs, 1.0).unwrap();
+    // evo counts no time: at 100 Hz, 100 poses are a second.
+    let per_second = relative_error(&pairs, Span::from_seconds(1.0)).unwrap();
+    for (ours, options) in
+        [(per_metre, ["-d", "1", "-u", "m", "--pairs_from_reference"]), (per_second, ["-d", "100", "-u", "f", "-v"])]
+    {
+        let rmse = |relation: &str| {
+            let mut command = Command::new("evo_rpe");
+            command.arg("tum").args([&truth, &estimate]).args(["--all_pairs", "-r", relation]).args(options);
+            rmse(&mut command)
+        };
+        let Some(position) = rmse("trans_part") else { return };
+        let rotation = rmse("angle_deg").unwrap();
+        assert_agree([ours.position_rmse_m, ours.rotation_rmse_rad.to_degrees()], [position, rotation]);
+    }
 }
 
 fn walk(error: f64) -> String {
@@ -77,9 +101,13 @@ fn walk(error: f64) -> String {
     text
 }
 
-fn evo(truth: &Path, estimate: &Path, relation: &str) -> Option<f64> {
-    let mut command = Command::new("evo_ape");
-    let output = run_or_skip("evo", command.arg("tum").args([truth, estimate]).args(["-a", "-r", relation]))?;
+fn evo_ape(truth: &Path, estimate: &Path, relation: &str) -> Option<f64> {
+    rmse(Command::new("evo_ape").arg("tum").args([truth, estimate]).args(["-a", "-r", relation]))
+}
+
+/// The RMSE that evo prints; `None` if it is not installed.
+fn rmse(command: &mut Command) -> Option<f64> {
+    let output = run_or_skip("evo", command)?;
     let text = String::from_utf8(output.stdout).unwrap();
     let line = text.lines().find(|line| line.trim().starts_with("rmse"));
     Some(line.unwrap_or_else(|| panic!("no rmse in:\n{text}")).split_whitespace().nth(1).unwrap().parse().unwrap())

@@ -1,0 +1,150 @@
+//! `zsim compare`: errors of several trajectories side by side, with limits for CI.
+
+use super::arguments::{Global, OutArguments};
+use super::limit::{Limit, fraction};
+use super::{Completion, output, trajectory_file};
+use anyhow::{Context, bail};
+use clap::Args;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use zsim::evaluation::{Errors, Pairs, TrajectoryErrors};
+use zsim::geometry::Trajectory;
+use zsim::report;
+use zsim::study::replace_text;
+
+/// Coverage below which a limit of the errors says little, for a note.
+const LOW_COVERAGE: f64 = 0.95;
+
+/// Compare estimated trajectories with the true one, and fail above a limit
+///
+/// Trajectories are TUM files with stamps of the same clock. Each estimate is aligned with the truth (rigid, by
+/// positions, as evo_ape -a). The table has the time covered, the absolute error of the position (APE: RMSE and maximum)
+/// and of the rotation (RMSE), the relative error of the position over 1 m of path and 1 s (RPE: RMSE), and the drift. --out
+/// writes comparison.json and the plots errors and trajectories.
+///
+/// The exit code is 1 if an estimate exceeds a limit, or is too short for the figure.
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  zsim compare --truth run.mcap open_loop.tum closed_loop.tum --out results/compared\n  \
+                  zsim compare --truth truth.tum a.tum --fail-above position_rmse=5mm --min-coverage 95%"
+)]
+pub(super) struct Arguments {
+    /// The estimated trajectories
+    #[arg(value_name = "A.tum", required = true)]
+    estimates: Vec<PathBuf>,
+    /// The true trajectory, or a recording with the ground truth
+    #[arg(long, value_name = "T.tum|T.mcap")]
+    truth: PathBuf,
+    /// Fail if a figure of an estimate is above this limit; can be repeated. The names are those of --json without the
+    /// unit: position_rmse=5mm, rotation_rmse=0.1deg, drift=2cm/min, relative_error_per_metre=1cm
+    #[arg(long, value_name = "NAME=LIMIT", value_parser = Limit::parse)]
+    fail_above: Vec<Limit>,
+    /// Fail if an estimate covers less of the truth's time (95% or 0.95); gaps of more than 1 s are not covered
+    #[arg(long, value_name = "FRACTION", value_parser = fraction)]
+    min_coverage: Option<f64>,
+    #[command(flatten)]
+    out: OutArguments,
+}
+
+/// An estimate with its errors.
+struct Compared {
+    /// The path as given.
+    name: String,
+    /// The name in tables and plots: the file's name without its ending, if no other estimate has the same.
+    label: String,
+    errors: TrajectoryErrors,
+    over_time: Errors,
+    /// The trajectory after the alignment, `world_from_head`.
+    aligned: Trajectory,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
+    let truth = trajectory_file::truth(&arguments.truth)?;
+    let compare = |path: &PathBuf| {
+        compare(path, &truth)
+            .with_context(|| format!("{} cannot be compared with {}", path.display(), arguments.truth.display()))
+    };
+    let mut compared = arguments.estimates.iter().map(compare).collect::<anyhow::Result<Vec<_>>>()?;
+    label(&mut compared);
+    let violations = violations(arguments, &compared);
+    let figures = figures(arguments, &compared, &violations);
+    let out = &arguments.out;
+    let folder = out.out.as_ref().map(|wanted| output::folder(wanted, out.force)).transpose()?;
+    if let Some(folder) = &folder {
+        write(folder, &truth, &compared, &figures)?;
+    }
+    output::print_result(global, &text(&compared, global.verbose), figures, folder.as_deref())?;
+    if !violations.is_empty() {
+        bail!("a limit is exceeded: {}", violations.join("; "));
+    }
+    let partial = compared.iter().find(|each| each.errors.coverage < LOW_COVERAGE);
+    let is_unlimited = !arguments.fail_above.is_empty() && arguments.min_coverage.is_none();
+    if let Some(each) = partial.filter(|_| is_unlimited && !global.quiet) {
+        let (name, covered) = (output::printable_name(&each.name), 100.0 * each.errors.coverage);
+        eprintln!("note: {name} covers {covered:.1} % of the truth; --min-coverage 95% would fail on it");
+    }
+    Ok(Completion::Done)
+}
+
+fn compare(path: &Path, truth: &Trajectory) -> anyhow::Result<Compared> {
+    let estimate = trajectory_file::estimate(path)?;
+    let pairs = Pairs::associate(&estimate, truth)?;
+    let (errors, over_time) = TrajectoryErrors::of(&pairs, truth)?;
+    let aligned = estimate.transformed(&pairs.world_from_map()?);
+    let name = path.display().to_string();
+    Ok(Compared { label: name.clone(), name, errors, over_time, aligned })
+}
+
+/// Shortens labels that stay different from each other.
+fn label(compared: &mut [Compared]) {
+    let stem = |each: &Compared| Path::new(&each.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stems: Vec<String> = compared.iter().map(stem).collect();
+    for (each, stem) in compared.iter_mut().zip(&stems) {
+        if stems.iter().filter(|other| *other == stem).count() == 1 {
+            each.label.clone_from(stem);
+        }
+    }
+}
+
+fn violations(arguments: &Arguments, compared: &[Compared]) -> Vec<String> {
+    let mut violations = Vec::new();
+    for each in compared {
+        let figures = report::trajectory_figures(&each.errors);
+        violations.extend(arguments.fail_above.iter().filter_map(|limit| limit.violation(&each.name, &figures)));
+        if let Some(needed) = arguments.min_coverage.filter(|needed| each.errors.coverage < *needed) {
+            let (name, covered) = (&each.name, 100.0 * each.errors.coverage);
+            violations.push(format!("{name}: covers {covered:.1} % of the truth (limit {:.1} %)", 100.0 * needed));
+        }
+    }
+    violations
+}
+
+fn figures(arguments: &Arguments, compared: &[Compared], violations: &[String]) -> Value {
+    let trajectory = |each: &Compared| {
+        let mut figures = report::trajectory_figures(&each.errors);
+        figures.shift_insert(0, "file".to_owned(), json!(each.name));
+        Value::Object(figures)
+    };
+    json!({
+        "truth": arguments.truth.display().to_string(),
+        "trajectories": compared.iter().map(trajectory).collect::<Vec<_>>(),
+        "passed": violations.is_empty(),
+        "violations": violations,
+    })
+}
+
+fn text(compared: &[Compared], is_verbose: bool) -> String {
+    let named: Vec<(&str, &TrajectoryErrors)> = compared.iter().map(|each| (&*each.label, &each.errors)).collect();
+    let details = if is_verbose { format!("\n{}", report::comparison_details(&named)) } else { String::new() };
+    report::comparison_table(&named) + &details
+}
+
+/// Writes the figures and plots into `folder`.
+fn write(folder: &Path, truth: &Trajectory, compared: &[Compared], figures: &Value) -> anyhow::Result<()> {
+    let errors: Vec<(&str, &Errors)> = compared.iter().map(|each| (&*each.label, &each.over_time)).collect();
+    report::compared_errors(&errors).save(folder, "errors")?;
+    let paths: Vec<(&str, &Trajectory)> = compared.iter().map(|each| (&*each.label, &each.aligned)).collect();
+    report::compared_trajectories(truth, &paths).save(folder, "trajectories")?;
+    replace_text(&folder.join("comparison.json"), &(serde_json::to_string_pretty(figures)? + "\n"))?;
+    Ok(())
+}
