@@ -342,10 +342,11 @@ mod tests {
 
     #[test]
     fn a_narrow_face_has_surfels_in_fine_detail_only() {
-        // A wall with a step of 0.2 m at y = 1 m, as the frame of a door: the face of the step looks along the wall.
-        let range_m = |to: &Vector| match [2.0 / to.x, 1.0 / to.y, 2.2 / to.x] {
-            [near, ..] if near * to.y >= 1.0 => near,
-            [_, face, far] => face.min(far),
+        // The end of a wall 0.26 m thick, as the jamb of a door: its face at y = 1.05 m looks along the wall.
+        let range_m = |to: &Vector| match [2.02 / to.x, 1.05 / to.y, 5.0 / to.x] {
+            [front, ..] if front * to.y >= 1.05 => front,
+            [_, face, _] if (2.02..2.28).contains(&(face * to.x)) => face,
+            [.., behind] => behind,
         };
         let (nominal, returns) = scans(Vector::new(0.0, -0.6, 0.0), 8, range_m);
         let shipped = spec::load("default").unwrap().surfels.max_incidence_deg;

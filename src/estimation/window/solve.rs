@@ -97,7 +97,9 @@ impl Window {
             linearised = None;
         }
         let is_weak = solved.conditioning < self.spec.surfels.fine.below_conditioning;
-        if is_weak && solved.matches + solved.view_matches >= self.spec.solve.min_matches {
+        // At the start the geometry is weak because the head hardly sweeps yet; small surfels are then lines.
+        let is_swept = self.rested_until_s <= self.start.u_s && !self.wide_matching;
+        if is_weak && is_swept && solved.matches + solved.view_matches >= self.spec.solve.min_matches {
             self.fine_until_s = self.nominal.end_s() + self.spec.window_s;
         }
         (solved, linearised)
