@@ -34,7 +34,7 @@ fn studies(c: &mut Criterion) {
     group.bench_function("10,000 designs and their Pareto set", |b| {
         let search = DesignSearch::new(&spec, &source).unwrap();
         b.iter(|| {
-            let (found, _) = search.explore(&|_| ());
+            let found = search.explore(&|_| ()).feasible;
             let costs: Vec<Vec<f64>> = found.iter().map(|c| c.costs.clone()).collect();
             zsim::study::sweep::pareto_set(&costs)
         });
