@@ -205,7 +205,8 @@ fn each_limit_rejects_what_it_names() {
     let without = rejected_by(lenient.clone()).rejected;
     // A negative gap is below 0 times the standard; nothing else but the missing rest pose rejects.
     assert!(without.keys().all(|limit| limit == "stable rest pose" || limit == "gap_over_standard"), "{without:?}");
-    let cases: [(&str, fn(&mut BuildLimitsSpec)); 8] = [
+    type Tighten = fn(&mut BuildLimitsSpec);
+    let cases: [(&str, Tighten); 8] = [
         ("index", |build| build.index = [7.0, 9.0]),
         ("clash_margin", |build| build.clash_margin = 8.0),
         ("gap_over_standard", |build| build.gap_over_standard = 8.0),
