@@ -111,8 +111,8 @@ impl WireStock {
 impl BuildLimitsSpec {
     /// The limits that a spring with these metrics violates, except the tipping margin.
     ///
-    /// `shake_hz` is the frequency of the shake. A margin that is not known is no violation: see
-    /// [`BuildLimitsSpec::unchecked`].
+    /// `shake_hz` is the frequency of the shake. A margin that is not known is no violation; the
+    /// design says so in `unchecked`.
     pub fn violations(&self, spring: &SpringSpec, metrics: &DesignMetrics, shake_hz: f64) -> Vec<Violation> {
         let (Ok(Some(wire)), Ok(SpringDesign::Coil(coil))) = (Wire::of(spring), spring.design()) else {
             return Vec::new();
