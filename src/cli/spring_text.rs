@@ -67,7 +67,10 @@ pub(super) fn design(study: &DesignStudy) -> String {
     let unchecked: BTreeSet<&str> = study.candidates.iter().flat_map(|design| &design.unchecked).copied().collect();
     if !unchecked.is_empty() {
         let names = unchecked.into_iter().collect::<Vec<_>>().join(", ");
-        text += &wrapped(&format!("not checked, since the material has no strength: {names}"), "  ");
+        text += &wrapped(
+            &format!("not checked (no strength of the wire is known, or a cable bears a part of the load): {names}"),
+            "  ",
+        );
     }
     if study.candidates.is_empty() {
         let advice = "no design is within all limits: widen the bounds, or relax the limit that rejects most designs";

@@ -11,6 +11,8 @@ const VERSION: u32 = 5;
 
 /// Writes `metadata.yaml` next to the MCAP file `recording`, for `ros2 bag play` and `ros2 bag info`; returns its path.
 ///
+/// After an interruption the file is complete or missing.
+///
 /// # Errors
 /// When the recording cannot be read, or the file cannot be written.
 pub fn write_rosbag2_metadata(recording: &Path) -> Result<PathBuf, RecordingError> {
@@ -18,7 +20,9 @@ pub fn write_rosbag2_metadata(recording: &Path) -> Result<PathBuf, RecordingErro
     let name = recording.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let path = recording.with_file_name(METADATA_FILE);
     let text = metadata(&name, info.messages, &info.topics);
-    std::fs::write(&path, text).map_err(|source| RecordingError::File { path: path.clone(), source })?;
+    let part = path.with_extension("yaml.part");
+    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
+    written.map_err(|source| RecordingError::File { path: path.clone(), source })?;
     Ok(path)
 }
 

@@ -7,6 +7,7 @@ mod averaging;
 mod base;
 #[path = "../command/mod.rs"]
 mod command;
+mod corridors;
 mod faults;
 mod fixture;
 mod formulation;

@@ -245,3 +245,15 @@ fn a_search_without_an_available_wire_is_an_error() {
     let error = DesignSearch::new(&DesignSpec { build, ..spec }, &source).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("no wire of 1.6 to 4 mm is available"), "{error}");
 }
+
+#[test]
+fn limits_that_a_cable_makes_unknown_are_named() {
+    let (spec, source) = load("spring_design");
+    let spec = DesignSpec { head: "backpack".to_owned(), evaluations: 200, candidates: 1, limits: Vec::new(), ..spec };
+    let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+    let [design] = &study.candidates[..] else { panic!("{:?}", study.rejected) };
+    assert_eq!(design.simulated.margins.clash, None);
+    for limit in ["clash_margin", "yield_margin", "fatigue_margin"] {
+        assert!(design.unchecked.contains(&limit), "{:?}", design.unchecked);
+    }
+}

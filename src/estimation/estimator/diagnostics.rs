@@ -113,3 +113,18 @@ fn is_dead_reckoning(problem: &WarningKind) -> bool {
         _ => false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vector;
+
+    #[test]
+    fn a_trace_of_information_about_a_direction_is_dead_reckoning() {
+        let along_a_corridor = |conditioning| WarningKind::WeakGeometry { conditioning, direction_in_map: Vector::x() };
+        // Conditionings of windows in a corridor without any face along it, and of windows on stairs.
+        for (conditioning, expected) in [(0.0, true), (3e-6, true), (2e-5, false), (4e-4, false)] {
+            assert_eq!(is_dead_reckoning(&along_a_corridor(conditioning)), expected, "{conditioning}");
+        }
+    }
+}

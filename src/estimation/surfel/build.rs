@@ -96,19 +96,16 @@ impl SurfelBuilder {
 
     /// The grids of all resolutions, of the `[regular, offset]` fragments of the usual and, if there are any, the fine voxels.
     fn grids<'a>(&self, fragments: &[[&'a [Fragment]; 2]]) -> Vec<Grid<'a>> {
+        let usual = (0..self.spec.levels).map(|level| (0, level, level));
+        let fine = (1..fragments.len()).map(|pair| (pair, 0, FINE));
         let mut grids = Vec::new();
-        for (pair, [regular, offset]) in fragments.iter().enumerate() {
-            for doublings in 0..if pair == 0 { self.spec.levels } else { 1 } {
-                let level = if pair == 0 { doublings } else { FINE };
-                grids.push(Grid { fragments: regular, doublings, shift: 0, level });
-                match (self.spec.offset_grids, doublings) {
-                    (false, _) => {}
-                    (true, 0) => grids.push(Grid { fragments: offset, doublings, shift: 0, level }),
-                    // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
-                    (true, _) => {
-                        grids.push(Grid { fragments: regular, doublings, shift: 1 << (doublings - 1), level });
-                    }
-                }
+        for (pair, doublings, level) in usual.chain(fine) {
+            let [regular, offset] = fragments[pair];
+            grids.push(Grid { fragments: regular, doublings, shift: 0, level });
+            if self.spec.offset_grids {
+                // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
+                let (fragments, shift) = if doublings == 0 { (offset, 0) } else { (regular, 1 << (doublings - 1)) };
+                grids.push(Grid { fragments, doublings, shift, level });
             }
         }
         grids

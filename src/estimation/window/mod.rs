@@ -28,7 +28,7 @@ use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::standstill::{Standstill, standstill};
 use super::strapdown::Interval;
-use super::surfel::{Detail, Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
+use super::surfel::{Detail, FINE, Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
@@ -64,6 +64,13 @@ struct WindowSegment {
     surfels: Vec<Surfel>,
     /// Cached fixed-view neighbours of each surfel.
     cached: Vec<CachedNeighbours>,
+}
+
+impl WindowSegment {
+    /// Number of surfels without those that only [`Detail::Fine`] has: segments of both kinds are then comparable.
+    fn usual_surfels(&self, least_points: f64) -> usize {
+        self.surfels.iter().filter(|surfel| surfel.level != FINE && surfel.points >= least_points).count()
+    }
 }
 
 /// The state of the estimator: trajectory, unknowns, and the surfels of the last few seconds.
@@ -318,9 +325,10 @@ impl Window {
     /// The rest of the window must contain `window_s` of swept segments, or the oldest segment must have few surfaces.
     /// A head at rest measures only lines and needs the older patches.
     pub(super) fn is_full(&self) -> bool {
-        let richest = self.segments.iter().map(|segment| segment.surfels.len()).max().unwrap_or(0);
+        let least_points = self.spec.surfels.min_points as f64;
+        let richest = self.segments.iter().map(|segment| segment.usual_surfels(least_points)).max().unwrap_or(0);
         let enough = (richest as f64 * MIN_SWEPT_RATIO) as usize;
-        let is_swept = |segment: &WindowSegment| segment.surfels.len() >= enough;
+        let is_swept = |segment: &WindowSegment| segment.usual_surfels(least_points) >= enough;
         let swept = self.segments.iter().filter(|segment| is_swept(segment)).count();
         let windows = |segments: usize| segments as f64 * self.spec.step_s / self.spec.window_s + 1e-9;
         let all = windows(self.segments.len());

@@ -68,5 +68,6 @@ pub use run::Shard;
 pub use runner::Runner;
 pub use spec::{AxisSpec, LevelSpec, Sampling, Setting, SweepSpec};
 pub use summary::{LevelSummary, RatioToFirst, SIGNIFICANCE_LEVEL, Summary, Trend};
+pub(super) use table::quoted;
 pub use task::{WorkerMessage, limit_process};
 pub(super) use tree::Journey;

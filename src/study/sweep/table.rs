@@ -75,7 +75,7 @@ impl Column {
 }
 
 /// Quotes text for CSV where needed (RFC 4180).
-pub(super) fn quoted(text: &str) -> String {
+pub(in crate::study) fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 

@@ -4,7 +4,8 @@ use super::limits::Violation;
 use super::spec::{CoilDesign, DesignSpec};
 use crate::dynamics::{HeadSpec, LinkageSpec, stands_with_mass};
 use crate::spec::Source;
-use crate::study::spring::{DesignMetrics, closed_form};
+use crate::study::spring::{DesignMetrics, StressCycle, Wire, closed_form};
+use crate::study::sweep::Measure;
 use serde::Serialize;
 
 /// A feasible design.
@@ -33,9 +34,7 @@ impl Evaluation {
     pub fn rejected_by(&self) -> Option<&'static str> {
         match self {
             Evaluation::Feasible(_) => None,
-            Evaluation::Infeasible(violations) => {
-                violations.iter().max_by(|a, b| a.excess.total_cmp(&b.excess)).map(|violation| violation.limit)
-            }
+            Evaluation::Infeasible(violations) => Violation::worst(violations).map(|violation| violation.limit),
             Evaluation::Invalid(reason) => Some(reason),
         }
     }
@@ -87,6 +86,28 @@ impl Evaluator {
         });
         let shake_hz = self.spec.shake.frequency_hz.unwrap_or(metrics.rocking_hz);
         of_measures.chain(self.spec.build.violations(&coil.spring(), metrics, shake_hz)).collect()
+    }
+
+    /// The limits that cannot be checked for a spring of this wire.
+    ///
+    /// Without strengths there are no limits of stress. With a cable the load on the spring does not follow from the motion
+    /// of the head.
+    pub fn unchecked(&self, wire: &Wire) -> Vec<&'static str> {
+        let unit = StressCycle { amplitude_pa: 1.0, mean_pa: 1.0 };
+        let has_cable = matches!(&self.head.linkage, LinkageSpec::Spring { cable: Some(_), .. });
+        let has_stress_limit = self.spec.limits.iter().any(|limit| limit.measure == Measure::StressShare);
+        let mut unchecked = Vec::new();
+        if has_cable {
+            unchecked.extend(["clash_margin", "gap_over_standard", "solid_margin", "buckling_margin"]);
+        }
+        if has_cable || wire.yield_pa().is_none() {
+            unchecked.push("yield_margin");
+            unchecked.extend(has_stress_limit.then_some("stress_share"));
+        }
+        if has_cable || wire.fatigue_margin(&unit, f64::INFINITY).is_none() {
+            unchecked.push("fatigue_margin");
+        }
+        unchecked
     }
 
     /// The head on the spring.

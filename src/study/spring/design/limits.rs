@@ -2,7 +2,7 @@
 
 use crate::elasticity::{SpringDesign, SpringSpec};
 use crate::spec::checked;
-use crate::study::spring::{DesignMetrics, Wire};
+use crate::study::spring::{DesignMetrics, SpringMargins, Wire};
 use serde::{Deserialize, Serialize};
 
 /// Limits of a spring that can be ordered and lasts; each has a default.
@@ -74,6 +74,13 @@ pub struct Violation {
     pub excess: f64,
 }
 
+impl Violation {
+    /// The violation with the largest excess.
+    pub fn worst(violations: &[Violation]) -> Option<&Violation> {
+        violations.iter().max_by(|a, b| a.excess.total_cmp(&b.excess))
+    }
+}
+
 impl Default for BuildLimitsSpec {
     fn default() -> Self {
         Self {
@@ -109,6 +116,12 @@ impl WireStock {
 }
 
 impl BuildLimitsSpec {
+    /// Margin of the stress cycle of a wire over the mission, at the frequency of the shake; `None` if it is not known.
+    pub fn fatigue_margin_of(&self, wire: &Wire, margins: &SpringMargins, shake_hz: f64) -> Option<f64> {
+        let cycles = self.mission_hours * 3600.0 * shake_hz;
+        wire.fatigue_margin(&margins.cycle?, cycles)
+    }
+
     /// The limits that a spring with these metrics violates, except the tipping margin.
     ///
     /// `shake_hz` is the frequency of the shake. A margin that is not known is no violation; the
@@ -118,7 +131,6 @@ impl BuildLimitsSpec {
             return Vec::new();
         };
         let margins = &metrics.margins;
-        let cycles = self.mission_hours * 3600.0 * shake_hz;
         let gap_over_standard = margins.gap_mm.map(|gap_mm| 1e-3 * gap_mm / coil.standard_gap_m());
         let least = [
             ("index", Some(wire.index()), self.index[0]),
@@ -127,11 +139,7 @@ impl BuildLimitsSpec {
             ("solid_margin", margins.solid, self.solid_margin),
             ("buckling_margin", margins.buckling, self.buckling_margin),
             ("yield_margin", margins.yielding, self.yield_margin),
-            (
-                "fatigue_margin",
-                margins.cycle.and_then(|cycle| wire.fatigue_margin(&cycle, cycles)),
-                self.fatigue_margin,
-            ),
+            ("fatigue_margin", self.fatigue_margin_of(&wire, margins, shake_hz), self.fatigue_margin),
         ];
         let too_little = least.into_iter().filter_map(|(limit, value, least)| {
             let value = value.filter(|value| *value < least)?;

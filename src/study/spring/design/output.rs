@@ -5,7 +5,7 @@ use super::spec::CoilDesign;
 use crate::elasticity::{EndsSpec, Material};
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
 use crate::study::spring::DesignMetrics;
-use crate::study::sweep::Measure;
+use crate::study::sweep::{Measure, quoted};
 use std::fmt::Write;
 
 /// Columns of the metrics.
@@ -70,7 +70,11 @@ fn coil_columns(coil: &CoilDesign) -> String {
     };
     format!(
         "{},{:.4},{:.4},{:.4},{:.4},{ends},{material}",
-        coil.name, coil.coil_diameter_mm, coil.wire_diameter_mm, coil.active_coils, coil.free_length_mm
+        quoted(&coil.name),
+        coil.coil_diameter_mm,
+        coil.wire_diameter_mm,
+        coil.active_coils,
+        coil.free_length_mm
     )
 }
 
@@ -84,7 +88,7 @@ pub fn rejected_csv(study: &DesignStudy) -> String {
     for rejection in &study.rejections {
         let by = if rejection.simulated { "simulation" } else { "closed_form" };
         let value = rejection.value.map_or(String::new(), |x| format!("{x:.5}"));
-        let limit = rejection.limit.replace([',', '\n'], ";");
+        let limit = quoted(&rejection.limit);
         let _ = writeln!(text, "{},{by},{limit},{value}", coil_columns(&rejection.coil));
     }
     text

@@ -29,7 +29,7 @@ pub struct VerifiedDesign {
     pub simulated: DesignMetrics,
     /// Margin of the stress cycle in the simulation over the mission; `None` if the strength of the wire is unknown.
     pub fatigue_margin: Option<f64>,
-    /// Limits that cannot be checked, because the material has no strength.
+    /// Limits that cannot be checked: the strength of the wire is not known, or a cable carries a part of the load.
     pub unchecked: Vec<&'static str>,
     /// Fraction of the sphere that the lidar covered.
     pub fraction_seen: f64,
@@ -255,18 +255,18 @@ impl DesignSearch {
             }
             Err(error) => return Err(error),
         };
-        if let Some(worst) = worst(&self.evaluator.violations(coil, &metrics)) {
+        if let Some(worst) = Violation::worst(&self.evaluator.violations(coil, &metrics)) {
             let (limit, value) = (worst.limit.to_owned(), worst.value);
             return Ok(Err(Rejection { coil: coil.clone(), simulated: true, limit, value }));
         }
         let wire = Wire::of(&coil.spring())?;
-        let cycles = spec.build.mission_hours * 3600.0 * spec.shake.frequency_hz.unwrap_or(metrics.rocking_hz);
-        let fatigue_margin = wire.zip(metrics.margins.cycle).and_then(|(w, cycle)| w.fatigue_margin(&cycle, cycles));
+        let shake_hz = spec.shake.frequency_hz.unwrap_or(metrics.rocking_hz);
+        let fatigue_margin = wire.and_then(|wire| spec.build.fatigue_margin_of(&wire, &metrics.margins, shake_hz));
         Ok(Ok(VerifiedDesign {
             candidate: candidate.clone(),
             simulated: metrics,
             fatigue_margin,
-            unchecked: wire.map_or(Vec::new(), |wire| spec.unchecked(&wire)),
+            unchecked: wire.map_or(Vec::new(), |wire| self.evaluator.unchecked(&wire)),
             fraction_seen: coverage.fraction_seen,
             saturated: coverage.gyro.saturated,
         }))
@@ -288,14 +288,9 @@ impl Exploration {
     }
 }
 
-/// The violation with the largest excess.
-fn worst(violations: &[Violation]) -> Option<&Violation> {
-    violations.iter().max_by(|a, b| a.excess.total_cmp(&b.excess))
-}
-
 fn rejection(coil: &CoilDesign, evaluation: &Evaluation) -> Option<Rejection> {
     let value = match evaluation {
-        Evaluation::Infeasible(violations) => worst(violations).and_then(|violation| violation.value),
+        Evaluation::Infeasible(violations) => Violation::worst(violations).and_then(|violation| violation.value),
         Evaluation::Feasible(_) | Evaluation::Invalid(_) => None,
     };
     let limit = evaluation.rejected_by()?.to_owned();

@@ -1,10 +1,10 @@
 //! Spec of a spring search: `specs/studies/NAME.ron`.
 
-use super::super::{Shake, StressCycle, Wire};
+use super::super::Shake;
 use super::limits::BuildLimitsSpec;
 use crate::elasticity::{EndsSpec, Material, SpringSpec};
 use crate::spec::checked;
-use crate::study::sweep::{GoalSpec, Measure, MeasureLimitSpec};
+use crate::study::sweep::{GoalSpec, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
 
 /// A search for a spring: design space, goals and limits.
@@ -33,23 +33,6 @@ pub struct DesignSpec {
     pub candidates: usize,
     /// Random seed.
     pub seed: u64,
-}
-
-impl DesignSpec {
-    /// The limits that cannot be checked for a wire, because its strengths are unknown.
-    pub fn unchecked(&self, wire: &Wire) -> Vec<&'static str> {
-        let unit = StressCycle { amplitude_pa: 1.0, mean_pa: 1.0 };
-        let has_stress_limit = self.limits.iter().any(|limit| limit.measure == Measure::StressShare);
-        let mut unchecked = Vec::new();
-        if wire.yield_pa().is_none() {
-            unchecked.push("yield_margin");
-            unchecked.extend(has_stress_limit.then_some("stress_share"));
-        }
-        if wire.fatigue_margin(&unit, f64::INFINITY).is_none() {
-            unchecked.push("fatigue_margin");
-        }
-        unchecked
-    }
 }
 
 /// Design space of a spring search.
