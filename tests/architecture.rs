@@ -75,6 +75,12 @@ const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
     ("sobol", &["study"]),
 ];
 
+/// Crates of the Python package: the library, and what converts its values.
+const PYTHON_CRATES: [&str; 7] = ["zsim", "numpy", "pyo3", "serde", "serde_json", "tempfile", "std"];
+
+/// Maximum length of a file of the Python package, lines; it converts values and computes nothing.
+const MAX_PYTHON_FILE: usize = 250;
+
 /// Names that the library must not use: the wall clock, collections with random iteration order, and sockets.
 const FORBIDDEN_IN_LIBRARY: [&str; 4] = ["SystemTime::now", "HashMap", "HashSet", "std::net"];
 
@@ -264,4 +270,51 @@ fn the_check_finds_a_circle_through_a_reexport_and_through_a_parent() {
     assert_eq!(count([("a/mod.rs", caller), called, leaf]), 1);
     let back = ("a/c.rs", "use super::B;\npub struct C(B);\n");
     assert_eq!(count([("a/mod.rs", parent), ("a/b.rs", "use super::c::C;\npub struct B(C);\n"), back]), 1);
+}
+
+/// The crates that code uses: the first segment of each path in a `use` declaration that is not of the crate itself.
+fn crates_used(text: &str) -> Vec<String> {
+    let code = code(text);
+    let paths = code.lines().filter_map(|line| line.trim().trim_start_matches("pub ").strip_prefix("use "));
+    let first = paths.map(|path| path.split("::").next().unwrap_or_default().trim_end_matches(';').to_owned());
+    first.filter(|name| !["crate", "super", "self"].contains(&name.as_str())).collect()
+}
+
+/// Uses of other crates, and arithmetic of its own, in a file of the Python package.
+fn python_violations(text: &str) -> Vec<String> {
+    let mut found: Vec<String> =
+        crates_used(text).into_iter().filter(|name| !PYTHON_CRATES.contains(&name.as_str())).collect();
+    let computes = [".sqrt()", ".sin()", ".cos()", ".norm()", ".inverse()", ".powi(", "nalgebra", "unsafe "];
+    found.extend(computes.into_iter().filter(|word| code(text).contains(word)).map(str::to_owned));
+    if text.lines().count() > MAX_PYTHON_FILE {
+        found.push(format!("more than {MAX_PYTHON_FILE} lines"));
+    }
+    found
+}
+
+#[test]
+fn the_python_package_only_converts_values_of_the_public_library() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/src");
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let violations = python_violations(&std::fs::read_to_string(&path).unwrap());
+        assert!(violations.is_empty(), "{}: {}", path.display(), violations.join(", "));
+        files += 1;
+    }
+    assert!(files > 5, "the folder has moved");
+    for (path, text) in sources() {
+        assert!(!code(&text).contains("pyo3"), "{}: the library must not use Python", path.display());
+    }
+}
+
+#[test]
+fn the_check_finds_computations_in_the_python_package() {
+    assert_eq!(
+        python_violations("use zsim::study::record;\nuse crate::arrays::matrix;\nuse std::path::Path;"),
+        [""; 0]
+    );
+    assert_eq!(python_violations("use rapier3d_f64::prelude::RigidBody;"), ["rapier3d_f64"]);
+    assert_eq!(python_violations("fn f(x: f64) -> f64 { x.sqrt() }"), [".sqrt()"]);
+    assert_eq!(python_violations(&"\n".repeat(251)), ["more than 250 lines"]);
 }

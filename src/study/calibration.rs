@@ -1,5 +1,6 @@
 //! Extrinsics and sensor models of a recording.
 
+use super::recorded_manifest::RecordedManifest;
 use super::sensor_models::{GivenModels, ImuNoiseSpec, LidarNoiseSpec, RecordedSensors, SensorModels, unknown_imu};
 use super::{Manifest, StudyError};
 use crate::dynamics::PlacementSpec;
@@ -27,6 +28,19 @@ pub struct CalibrationSpec {
     pub imu_averaging: Option<ImuAveraging>,
     /// The lidar's noise.
     pub lidar: Option<LidarNoiseSpec>,
+}
+
+/// The calibration of a recording's sensors: from `given`, else from the recording, else that of unknown sensors.
+///
+/// # Errors
+/// When the recording cannot be read, or `/tf_static` does not connect the sensors.
+pub fn recording_calibration(
+    reader: &Reader,
+    selection: &Selection,
+    given: &CalibrationSpec,
+) -> Result<FoundCalibration, StudyError> {
+    let recorded = RecordedManifest::read(reader);
+    Ok(calibration(reader, selection, given, recorded.sensors(), None)?.0)
 }
 
 /// The calibration for an estimate: from the user, else from the recording, else the defaults.

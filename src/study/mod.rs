@@ -57,7 +57,7 @@ mod truth_cursor;
 pub use atomic_file::{replace_bytes, replace_text};
 pub use base::{base_by_imu, base_by_law};
 pub use bound::{RecordingBound, information_bound};
-pub use calibration::CalibrationSpec;
+pub use calibration::{CalibrationSpec, recording_calibration};
 pub use cloud_files::{CloudFormat, CloudOptions};
 pub use disk::free_bytes;
 pub use error::StudyError;

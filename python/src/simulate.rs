@@ -1,0 +1,46 @@
+//! Simulations.
+
+use crate::background;
+use crate::failure::Failure;
+use crate::recording::Recording;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use zsim::simulation::{Scenario, Simulation};
+use zsim::study::record;
+
+/// Simulates the scenario, JSON, into the recording `path`, or into a temporary file.
+#[pyfunction]
+#[pyo3(signature = (scenario, path, overwrite, progress))]
+pub fn simulate(
+    py: Python<'_>,
+    scenario: &str,
+    path: Option<PathBuf>,
+    overwrite: bool,
+    progress: Option<Py<PyAny>>,
+) -> Result<Recording, Failure> {
+    let scenario: Scenario = serde_json::from_str(scenario)?;
+    let folder = match &path {
+        Some(_) => None,
+        None => Some(tempfile::tempdir().map_err(|error| Failure::other(format!("no temporary folder: {error}")))?),
+    };
+    let recording = match (path, &folder) {
+        (Some(path), _) => path,
+        (None, Some(folder)) => folder.path().join("recording.mcap"),
+        (None, None) => return Err(Failure::other("no file for the recording")),
+    };
+    let truth = recording.with_extension("tum");
+    if truth == recording {
+        return Err(Failure::input("path: the recording needs another ending than .tum, such as .mcap"));
+    }
+    if let Some(existing) = [&recording, &truth].into_iter().find(|file| file.exists() && !overwrite) {
+        let message = format!("{} exists: pass another path, or overwrite=True", existing.display());
+        return Err(Failure::input(message));
+    }
+    let written = recording.clone();
+    background::run(py, progress.as_ref(), move |progress| {
+        let simulation = Simulation::prepare(&scenario)?;
+        progress.monitored(|watch| record(&simulation, &written, &truth, false, watch))?;
+        Ok(())
+    })?;
+    Recording::of(recording, folder)
+}
