@@ -1,0 +1,12 @@
+# The command zsim in an image:
+#   docker build -t zsim . && docker run --rm -v "$PWD:/data" zsim --scene office --out results/office
+FROM rust:1.89-bookworm AS build
+WORKDIR /zsim
+COPY . .
+RUN cargo build --release --locked
+
+FROM debian:bookworm-slim
+COPY --from=build /zsim/target/release/zsim /usr/local/bin/zsim
+COPY --from=build /zsim/LICENSE-APACHE /zsim/LICENSE-MIT /usr/share/doc/zsim/
+WORKDIR /data
+ENTRYPOINT ["zsim"]
