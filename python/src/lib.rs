@@ -1,5 +1,7 @@
 //! The Python module `zsim._zsim`: converts arguments and results of the library; the package `zsim` documents it.
 
+#![allow(clippy::needless_pass_by_value, reason = "PyO3 converts each argument to a value of the function")]
+
 mod arrays;
 mod background;
 mod calibration;
