@@ -34,8 +34,8 @@ const LINK_INFORMATION: f64 = 0.1;
 const OUTLIER_M: f64 = 1.0;
 /// Lever arm that converts a residual heading to a distance, m: typical distance of surfaces.
 const ARM_M: f64 = 4.0;
-/// Maximum residual of a link between successive nodes, m; if the loops cause more, they are rejected together.
-const MAX_LINK_RESIDUAL_M: f64 = 0.25;
+/// Maximum change of the relative pose of linked nodes, m; if the loops cause more, they are rejected together.
+const MAX_STRAIN_M: f64 = 0.25;
 /// Weak prior that determines unconstrained knots, 1/m^2 and 1/rad^2.
 const PRIOR_INFORMATION: f64 = 1e-3;
 
@@ -55,6 +55,8 @@ struct Edge {
     early: PlacePose,
     alignment: Alignment,
     information: Matrix4<f64>,
+    /// Deviation before the optimisation.
+    initial: Vector4<f64>,
 }
 
 /// Optimises `corrected` with `loops` and `links` between successive nodes; returns the times of the inlier loops.
@@ -93,7 +95,7 @@ pub(in crate::estimation::registration) fn optimise(
         links.iter_mut().chain(&mut loops).for_each(|edge| edge.correct(first_knot, &x));
         scale_m = (0.5 * scale_m).max(OUTLIER_M);
     }
-    let is_contradicted = !loops.is_empty() && links.iter().any(|link| link.residual_m() > MAX_LINK_RESIDUAL_M);
+    let is_contradicted = !loops.is_empty() && links.iter().any(|link| link.strain_m() > MAX_STRAIN_M);
     (!is_contradicted).then(|| loops.iter().map(|edge| edge.times_s).collect())
 }
 
@@ -104,13 +106,10 @@ impl Edge {
             PlacePose { basis, position, turn: Rotation::identity() }
         };
         let (late, early) = (place_pose(measured.times_s.0), place_pose(measured.times_s.1));
-        Self {
-            times_s: measured.times_s,
-            late,
-            early,
-            alignment: measured.alignment,
-            information: measured.information,
-        }
+        let RelativePose { times_s, alignment, information } = *measured;
+        let mut edge = Self { times_s, late, early, alignment, information, initial: Vector4::zeros() };
+        edge.initial = edge.deviation();
+        edge
     }
 
     /// `[e_r, e_t]`.
@@ -124,8 +123,14 @@ impl Edge {
 
     /// Norm of the residual, m; the heading is converted with `ARM_M`.
     fn residual_m(&self) -> f64 {
-        let e = self.deviation();
-        Vector::new(e[1], e[2], e[3]).norm().hypot(ARM_M * e[0])
+        norm_m(&self.deviation())
+    }
+
+    /// Change of the relative pose by the optimisation, m.
+    ///
+    /// Not the residual: a link may slip along a corridor, with little information but a large residual from the start.
+    fn strain_m(&self) -> f64 {
+        norm_m(&(self.deviation() - self.initial))
     }
 
     /// Derivatives of the deviation by the corrections `[dr, dt]` of the later and the earlier node.
@@ -169,6 +174,11 @@ impl Edge {
     }
 }
 
+/// Norm of a deviation `[yaw, shift]`, m; the heading is converted with `ARM_M`.
+fn norm_m(e: &Vector4<f64>) -> f64 {
+    Vector::new(e[1], e[2], e[3]).norm().hypot(ARM_M * e[0])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,6 +203,7 @@ mod tests {
             early: place_pose(2.5, 0.1),
             alignment,
             information,
+            initial: Vector4::zeros(),
         };
         let (by_late, by_early) = edge.derivatives();
         let step = 1e-6;
@@ -268,5 +279,25 @@ mod tests {
         let closed = optimise(&mut corrected, &loops, &remaining, 0.002).unwrap();
         assert_eq!(closed.len(), 4, "{closed:?}");
         assert!((end_m(&corrected) - before - drift).norm() < 0.1, "{}", end_m(&corrected) - before);
+    }
+
+    /// A corridor: each link is registered 1.6 m along it from the open loop, with little information, and the open loop is
+    /// 50 cm too short.
+    #[test]
+    fn links_that_slipped_along_a_corridor_do_not_reject_loops() {
+        let (mut corrected, at_s) = straight();
+        let before = end_m(&corrected);
+        let slipped = |pair: &[f64]| {
+            let information = Matrix4::from_diagonal(&Vector4::new(3e5, 1.0, 1e4, 1e4));
+            RelativePose { information, ..relative_pose((pair[1], pair[0]), Vector::x() * 4.8) }
+        };
+        let links: Vec<RelativePose> = at_s.windows(2).map(slipped).collect();
+        let drift = Vector::x() * 0.5;
+        let loops: Vec<RelativePose> =
+            (25..28).map(|k| relative_pose((at_s[k], at_s[k - 20]), Vector::x() * 64.0 + drift)).collect();
+        let closed = optimise(&mut corrected, &loops, &links, 0.002).unwrap();
+        assert_eq!(closed.len(), 3, "{closed:?}");
+        let moved = end_m(&corrected) - before;
+        assert!(moved.x > 0.4 && moved.yz().norm() < 0.01, "{moved}");
     }
 }
