@@ -3,9 +3,9 @@
 FROM rust:1.89-bookworm AS build
 WORKDIR /zsim
 COPY . .
-RUN cargo build --release --locked
+RUN cargo build --release --locked --config profile.release.strip=true
 
-FROM debian:bookworm-slim
+FROM gcr.io/distroless/cc-debian12
 COPY --from=build /zsim/target/release/zsim /usr/local/bin/zsim
 COPY --from=build /zsim/LICENSE-APACHE /zsim/LICENSE-MIT /usr/share/doc/zsim/
 WORKDIR /data

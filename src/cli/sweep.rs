@@ -4,7 +4,7 @@ use super::arguments::Global;
 use super::bars::{WorkBar, end_polling, stop_flag};
 use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
-use super::{Completion, output, repeat, slurm};
+use super::{Completion, output, repeat, submit};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use serde_json::json;
@@ -41,7 +41,7 @@ enum Command {
     Status(FolderArguments),
     Merge(FolderArguments),
     Repeat(repeat::Arguments),
-    Submit(slurm::Arguments),
+    Submit(submit::Arguments),
     #[command(hide = true)]
     Task(TaskArguments),
 }
@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         }
         Command::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
         Command::Repeat(repeat) => repeat::run(repeat, global),
-        Command::Submit(submit) => slurm::run(submit, global),
+        Command::Submit(arguments) => submit::run(arguments, global),
         Command::Task(task) => run_task(task),
     }
 }

@@ -6,6 +6,7 @@
 mod command;
 mod coverage;
 mod gains;
+mod kubernetes;
 mod latency;
 mod reference_system;
 mod reproduction;

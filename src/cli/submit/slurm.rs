@@ -1,91 +1,31 @@
-//! `zsim sweep submit`: a sweep as a Slurm job array.
+//! A sweep as a Slurm job array.
 
-use super::arguments::Global;
-use super::usage::Usage;
-use super::{Completion, output};
-use anyhow::{Context, bail};
-use clap::Args;
-use serde_json::json;
+use super::super::usage::Usage;
+use super::submission::{Submission, output_of};
+use anyhow::Context;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use zsim::study::replace_text;
-use zsim::study::sweep::{Shard, Sweep};
 
-/// Default number of runs per array element; a scheduler needs about 1 s for each element.
-const RUNS_PER_ELEMENT: u64 = 20;
-/// Maximum default number of elements; the default limit of Slurm is 1001.
-const MAX_ELEMENTS: u64 = 1000;
 /// Maximum length of a job name, characters.
 const MAX_NAME_LENGTH: usize = 64;
-/// Memory above the limit of a run, MiB: for the process that supervises the runs.
-const SUPERVISOR_MEMORY_MIB: u64 = 256;
 
-/// Submit a sweep to a scheduler as a job array; each element does a part of the runs
-///
-/// All nodes must see the folder. Merge when the array is done; submit a second time for missing runs.
-#[derive(Args)]
-#[command(after_help = "Example:\n  zsim sweep submit results/springs --slurm --elements 16")]
-pub(super) struct Arguments {
-    /// Folder of the sweep, created by `zsim sweep plan`
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
-    /// Submit to Slurm (the only supported scheduler)
-    #[arg(long, required = true)]
-    slurm: bool,
-    /// Number of array elements [default: one for 20 runs, 1000 at most]
-    #[arg(long, value_name = "M")]
-    elements: Option<u64>,
-    /// Options for sbatch, such as "--partition=long --time=2:00:00"
-    #[arg(long, value_name = "OPTIONS", default_value = "", allow_hyphen_values = true)]
-    sbatch: String,
-    /// Write DIR/slurm/array.sh and do not submit it
-    #[arg(long)]
-    dry_run: bool,
-}
-
-pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
-    let folder = arguments.folder.canonicalize();
-    let folder = folder.with_context(|| format!("{} cannot be found", arguments.folder.display()))?;
-    let log = log_option(&folder)?;
-    let sweep = Sweep::open(&folder)?;
-    let status = sweep.status(Shard::WHOLE)?;
-    if status.missing == 0 {
-        output::print_result(global, "all runs are complete", json!({ "job": null, "elements": 0 }), Some(&folder))?;
-        return Ok(Completion::Done);
-    }
-    let wanted = arguments.elements.unwrap_or_else(|| status.missing.div_ceil(RUNS_PER_ELEMENT).min(MAX_ELEMENTS));
-    if wanted == 0 {
-        return Err(Usage("--elements 0: must be at least 1".to_owned()).into());
-    }
-    let elements = wanted.min(sweep.tasks() as u64).max(1);
-    let logs = folder.join("slurm");
-    std::fs::create_dir_all(&logs).with_context(|| format!("cannot create {}", logs.display()))?;
-    let script = logs.join("array.sh");
-    let threads = global.threads.map_or(1, std::num::NonZeroUsize::get);
-    replace_text(&script, &text(&sweep, &log, &folder, elements, threads)?)?;
-    if arguments.dry_run {
-        output::print_result(global, "", json!({ "job": null, "elements": elements }), Some(&script))?;
-        return Ok(Completion::Done);
-    }
-    let job = submit_script(&script, &arguments.sbatch)?;
-    let words = format!("job {job}: {elements} elements for {} runs; then: zsim sweep merge", status.missing);
-    output::print_result(global, &words, json!({ "job": job, "elements": elements }), Some(&folder))?;
-    Ok(Completion::Done)
+/// Writes the script of the job array; returns its path.
+pub(super) fn write(submission: &Submission) -> anyhow::Result<PathBuf> {
+    submission.write("slurm", "array.sh", &text(submission)?)
 }
 
 /// The script of the job array.
-fn text(sweep: &Sweep, log: &str, folder: &Path, elements: u64, threads: usize) -> anyhow::Result<String> {
+fn text(submission: &Submission) -> anyhow::Result<String> {
+    let Submission { sweep, folder, elements, threads } = submission;
     let program = std::env::current_exe().context("this program's own path is not known")?;
-    let memory_mib =
-        sweep.limit().map_or(SUPERVISOR_MEMORY_MIB, |limit| limit.memory_mib * threads as u64) + SUPERVISOR_MEMORY_MIB;
     let mut text = "#!/bin/sh\n".to_owned();
     for option in [
         format!("--job-name=zsim-{}", job_name(sweep.plan().name())),
         format!("--array=0-{}", elements - 1),
         format!("--cpus-per-task={threads}"),
-        format!("--mem={memory_mib}M"),
-        log.to_owned(),
+        format!("--mem={}M", submission.memory_mib()),
+        log_option(folder)?,
     ] {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "#SBATCH {option}");
@@ -129,17 +69,12 @@ fn quoted(path: &Path) -> anyhow::Result<String> {
 }
 
 /// Submits the script with sbatch and returns the job number.
-fn submit_script(script: &Path, options: &str) -> anyhow::Result<u64> {
+pub(super) fn submit(script: &Path, options: &str) -> anyhow::Result<u64> {
     let mut sbatch = Command::new("sbatch");
-    sbatch.arg("--parsable").args(options.split_whitespace()).arg(script);
-    let output = sbatch.output().context("sbatch cannot be run: is Slurm installed here?")?;
-    if !output.status.success() {
-        bail!("sbatch refused: {}", String::from_utf8_lossy(&output.stderr).trim());
-    }
+    let printed = output_of(sbatch.arg("--parsable").args(options.split_whitespace()).arg(script), "Slurm")?;
     // `number` or `number;cluster`.
-    let printed = String::from_utf8_lossy(&output.stdout);
-    let number = printed.trim().split(';').next().and_then(|number| number.parse().ok());
-    number.with_context(|| format!("sbatch printed \"{}\", expected a job number", printed.trim()))
+    let number = printed.split(';').next().and_then(|number| number.parse().ok());
+    number.with_context(|| format!("sbatch printed \"{printed}\", expected a job number"))
 }
 
 #[cfg(test)]
