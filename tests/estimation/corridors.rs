@@ -11,7 +11,7 @@ fn fine_surfels_show_the_motion_along_a_corridor() {
     let without = shipped.replacen("below_conditioning: 0.03,", "below_conditioning: 0,", 1);
     assert_ne!(without, shipped);
     std::fs::write(here.path().join("without.ron"), without).unwrap();
-    let seeds = [3, 4, 5, 6];
+    let seeds = [5, 6];
     let mut mean_m = [0.0; 2];
     for seed in seeds {
         let simulated = format!("simulate --scene corridors --duration 45s --seed {seed} --quiet -o run.mcap --force");
@@ -26,5 +26,5 @@ fn fine_surfels_show_the_motion_along_a_corridor() {
         }
     }
     let [with_m, without_m] = mean_m;
-    assert!(with_m < 0.09 && without_m > 2.0 * with_m, "{with_m} m with fine surfels, {without_m} m without");
+    assert!(with_m < 0.05 && without_m > 2.0 * with_m, "{with_m} m with fine surfels, {without_m} m without");
 }

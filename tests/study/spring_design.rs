@@ -249,7 +249,9 @@ fn a_search_without_an_available_wire_is_an_error() {
 #[test]
 fn limits_that_a_cable_makes_unknown_are_named() {
     let (spec, source) = load("spring_design");
-    let spec = DesignSpec { head: "backpack".to_owned(), evaluations: 200, candidates: 1, limits: Vec::new(), ..spec };
+    let mut spec =
+        DesignSpec { head: "backpack".to_owned(), evaluations: 300, candidates: 1, limits: Vec::new(), ..spec };
+    spec.goals.retain(|goal| goal.measure.key() == "rocking_hz");
     let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
     let [design] = &study.candidates[..] else { panic!("{:?}", study.rejected) };
     assert_eq!(design.simulated.margins.clash, None);

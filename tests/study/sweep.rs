@@ -268,7 +268,7 @@ const WALKS: &str = r#"(
     ],
     sampling: grid,
     seeds: [3],
-    measures: [position_rmse_m, drift_m_per_min, fraction_seen, wall_s],
+    measures: [position_rmse_m, drift_m_per_min, fraction_seen, open_loop_time_ratio, wall_s],
 )"#;
 
 #[test]

@@ -39,6 +39,7 @@ pub(super) struct EstimateMetrics {
     clock_errors_s: [Option<f64>; 2],
     rigid_link_rmse_m: Option<f64>,
     closed_position_rmse_m: Option<f64>,
+    closed_loop_time_ratio: Option<f64>,
     slam_bound_m: Option<f64>,
     status: Status,
     integrity: IntegrityMetrics,
@@ -58,6 +59,8 @@ impl EstimateMetrics {
             Measure::ClockError120S => self.clock_errors_s[1],
             Measure::RigidLinkRmseM => self.rigid_link_rmse_m,
             Measure::ClosedPositionRmseM => self.closed_position_rmse_m,
+            Measure::OpenLoopTimeRatio => self.open_loop.fraction_of_acquisition,
+            Measure::ClosedLoopTimeRatio => self.closed_loop_time_ratio,
             Measure::ErrorOverSlamBound => {
                 self.closed_position_rmse_m.zip(self.slam_bound_m).map(|(error_m, bound_m)| error_m / bound_m)
             }
@@ -110,6 +113,7 @@ fn metrics(estimates: &Estimates, inputs: &RunInputs, watch: &mut ProgressMonito
         rigid_link_rmse_m: truth
             .and_then(|truth| rigid_link_rmse_m(inputs.simulation.head(), &run.map_from_head, truth)),
         closed_position_rmse_m: closed_errors.and_then(|known| known.errors).map(|errors| errors.position_rmse_m),
+        closed_loop_time_ratio: closed.as_ref().map(|closed| closed.wall_s / run.acquisition_s),
         slam_bound_m: inputs.slam_bound_m,
         status: integrity.status(),
         integrity: integrity.metrics(run, Some(&estimates.pairs())),

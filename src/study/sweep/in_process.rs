@@ -18,7 +18,7 @@ pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutc
         _ => metrics(plan, measures, index),
     };
     let outcome = evaluated.unwrap_or_else(|error| RunOutcome::from_error(measures.len(), &error));
-    RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
+    RunOutcome { times: vec![Some(started.elapsed().as_secs_f64())], ..outcome }
 }
 
 fn metrics(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, StudyError> {

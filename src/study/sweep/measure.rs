@@ -93,7 +93,12 @@ pub enum Measure {
     SpringMassG,
     /// Maximum stress in the wire over the yield strength.
     StressShare,
-    /// Computing time of the run on its thread, s. It is reported in `times.parquet`, not in the table of results.
+    /// Computing time of the open loop on one thread over the length of the recording. Like the next two it is reported in
+    /// `times.parquet`, not in the table of results.
+    OpenLoopTimeRatio,
+    /// The same of the loop closure.
+    ClosedLoopTimeRatio,
+    /// Computing time of the run on its thread, s.
     WallS,
 }
 
@@ -114,20 +119,22 @@ pub(super) enum Origin {
     ClosedForm,
     /// Simulation of the swing in a journey, else the closed form.
     SwingOrClosedForm,
-    /// Measured computing time.
+    /// Measured computing time of an estimate.
+    EstimateWallClock,
+    /// Measured computing time of a run.
     WallClock,
 }
 
 impl Origin {
     /// Whether the measure needs a recording and an estimate.
     pub(super) fn is_estimate(self) -> bool {
-        matches!(self, Self::Estimate | Self::Map | Self::AnyMap | Self::Reference)
+        matches!(self, Self::Estimate | Self::Map | Self::AnyMap | Self::Reference | Self::EstimateWallClock)
     }
 }
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 38] = [
+    pub const ALL: [Self; 40] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
@@ -165,6 +172,8 @@ impl Measure {
         Self::SagMm,
         Self::SpringMassG,
         Self::StressShare,
+        Self::OpenLoopTimeRatio,
+        Self::ClosedLoopTimeRatio,
         Self::WallS,
     ];
 
@@ -226,6 +235,8 @@ impl Measure {
             Self::SagMm => ("sag_mm", "sag", "Static compression (mm)", "mm", 1.0),
             Self::SpringMassG => ("spring_mass_g", "mass", "Mass of the spring (g)", "g", 1.0),
             Self::StressShare => ("stress_share", "stress", "Stress over yield strength (%)", "%", 1e2),
+            Self::OpenLoopTimeRatio => ("open_loop_time_ratio", "loop time", "Open loop time (%)", "%", 1e2),
+            Self::ClosedLoopTimeRatio => ("closed_loop_time_ratio", "closure time", "Closure time (%)", "%", 1e2),
             Self::WallS => ("wall_s", "time", "Computing time (s)", "s", 1.0),
         }
     }
@@ -292,8 +303,19 @@ impl Measure {
             Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => {
                 Origin::ClosedForm
             }
+            Self::OpenLoopTimeRatio | Self::ClosedLoopTimeRatio => Origin::EstimateWallClock,
             Self::WallS => Origin::WallClock,
         }
+    }
+
+    /// Whether it is a computing time, which differs from run to run.
+    pub(super) fn is_time(self) -> bool {
+        matches!(self.origin(), Origin::EstimateWallClock | Origin::WallClock)
+    }
+
+    /// Whether runs with this measure close loops.
+    pub(super) fn needs_closed_loop(self) -> bool {
+        matches!(self, Self::ClosedPositionRmseM | Self::ErrorOverSlamBound | Self::ClosedLoopTimeRatio)
     }
 
     /// Whether runs with this measure keep the clock offset over time.
@@ -314,6 +336,7 @@ impl Measure {
         match self.origin() {
             Origin::WallClock | Origin::SwingOrClosedForm => true,
             Origin::ClosedForm => matches!(base, BaseSpec::Spring { .. }),
+            Origin::EstimateWallClock => matches!(base, BaseSpec::Journey { timing: None, .. }),
             Origin::Estimate if self != Self::PositionRmseM => matches!(base, BaseSpec::Journey { timing: None, .. }),
             Origin::Map => matches!(base, BaseSpec::Journey { timing: Some(_), .. }),
             Origin::AnyMap => Self::ClockErrorS.is_available_for(base) || Self::ReferenceRmseM.is_available_for(base),

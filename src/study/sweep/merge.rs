@@ -84,8 +84,13 @@ impl Sweep {
     }
 
     /// Path of the table of computing times.
-    pub(super) fn times(&self) -> PathBuf {
+    fn times(&self) -> PathBuf {
         self.folder.join("times.parquet")
+    }
+
+    /// Path of the table that contains `measure`.
+    pub(super) fn table_of(&self, measure: Measure) -> PathBuf {
+        if measure.is_time() { self.times() } else { self.table() }
     }
 
     fn table_columns(&self) -> Vec<(String, ColumnType)> {
@@ -100,7 +105,8 @@ impl Sweep {
 
     fn empty_buffer(&self) -> RowBuffer {
         let figures = vec![Vec::new(); self.plan.result_measures().len()];
-        RowBuffer { numbers: Vec::new(), figures, errors: Vec::new(), times: Vec::new() }
+        let times = vec![Vec::new(); self.plan.time_measures().len()];
+        RowBuffer { numbers: Vec::new(), figures, errors: Vec::new(), times }
     }
 }
 
@@ -109,7 +115,7 @@ struct RowBuffer {
     numbers: Vec<u64>,
     figures: Vec<Vec<Option<f64>>>,
     errors: Vec<Option<String>>,
-    times: Vec<Option<f64>>,
+    times: Vec<Vec<Option<f64>>>,
 }
 
 impl RowBuffer {
@@ -120,7 +126,7 @@ impl RowBuffer {
             match k {
                 k if k < measures => self.figures[k].extend(column.numbers()),
                 k if k == measures => self.errors.extend(column.texts()),
-                _ => self.times.extend(column.numbers()),
+                _ => self.times[k - measures - 1].extend(column.numbers()),
             }
         }
     }
@@ -140,8 +146,9 @@ impl Tables {
         let mut csv = BufWriter::new(AtomicFile::new(&temporary, &sweep.folder.join("table.csv"))?);
         let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
         writeln!(csv, "{}", names.join(",")).map_err(StudyError::file(csv.get_ref().target()))?;
-        let time_columns =
-            [("point".to_owned(), ColumnType::Counts), (Measure::WallS.key().to_owned(), ColumnType::Numbers)];
+        let times = sweep.plan.time_measures().into_iter();
+        let times = times.map(|measure| (measure.key().to_owned(), ColumnType::Numbers));
+        let time_columns: Vec<_> = [("point".to_owned(), ColumnType::Counts)].into_iter().chain(times).collect();
         let times = TableWriter::create(&temporary, &sweep.times(), &time_columns)?;
         Ok(Self { parquet, csv, times })
     }
@@ -154,7 +161,8 @@ impl Tables {
         columns.push(Column::Text(buffer.errors));
         columns.push(Column::Text(buffer.numbers.iter().map(identity).collect()));
         self.parquet.write(&columns)?;
-        self.times.write(&[columns[0].clone(), Column::Numbers(buffer.times)])?;
+        let times = buffer.times.into_iter().map(Column::Numbers);
+        self.times.write(&[columns[0].clone()].into_iter().chain(times).collect::<Vec<_>>())?;
         for row in 0..buffer.numbers.len() {
             let cells: Vec<String> = columns.iter().map(|column| column.cell(row)).collect();
             let line = writeln!(self.csv, "{}", cells.join(","));
@@ -190,12 +198,12 @@ impl ProgressCounter {
             return;
         };
         self.done += unit.count;
-        for column in columns {
-            if let Column::Text(errors) = column {
-                self.failed += errors.iter().flatten().count() as u64;
-            }
+        // The computing time of the run follows the errors.
+        let Some(at) = columns.iter().position(|column| matches!(column, Column::Text(_))) else { return };
+        if let Column::Text(errors) = &columns[at] {
+            self.failed += errors.iter().flatten().count() as u64;
         }
-        if let Some(Column::Numbers(times)) = columns.last() {
+        if let Some(Column::Numbers(times)) = columns.get(at + 1) {
             self.wall_s += times.iter().flatten().sum::<f64>();
         }
     }

@@ -38,8 +38,8 @@ pub(super) struct RunOutcome {
     pub figures: Vec<Option<f64>>,
     /// Error message of a failed run.
     pub error: Option<String>,
-    /// Computing time, s.
-    pub wall_s: Option<f64>,
+    /// One figure per measure of the computing time.
+    pub times: Vec<Option<f64>>,
     /// What the table does not contain, as RON: the errors over time and the map of a run with timing errors.
     pub details: Option<String>,
 }
@@ -69,22 +69,21 @@ impl RunOutcome {
 
 impl Sweep {
     fn part_columns(&self) -> Vec<(String, ColumnType)> {
-        let measures =
-            self.plan.result_measures().into_iter().map(|measure| (measure.key().to_owned(), ColumnType::Numbers));
-        measures
-            .chain([("error".to_owned(), ColumnType::Text), (Measure::WallS.key().to_owned(), ColumnType::Numbers)])
-            .collect()
+        let numbers = |measure: Measure| (measure.key().to_owned(), ColumnType::Numbers);
+        let measures = self.plan.result_measures().into_iter().map(numbers);
+        let times = self.plan.time_measures().into_iter().map(numbers);
+        measures.chain([("error".to_owned(), ColumnType::Text)]).chain(times).collect()
     }
 
     /// Writes a unit's part file atomically.
     pub(super) fn write_part(&self, unit: &Unit, rows: &[RunOutcome]) -> Result<(), StudyError> {
         let mut table = TableWriter::create(&self.temporary(), &self.part_path(unit), &self.part_columns())?;
-        let measures = self.plan.result_measures().len();
-        let figures =
-            |k: usize| rows.iter().map(|row| row.figures.get(k).copied().flatten().filter(|x| x.is_finite())).collect();
-        let mut columns: Vec<Column> = (0..measures).map(|k| Column::Numbers(figures(k))).collect();
+        let (measures, times) = (self.plan.result_measures().len(), self.plan.time_measures().len());
+        let cell = |figures: &[Option<f64>], k: usize| figures.get(k).copied().flatten().filter(|x| x.is_finite());
+        let figures = |k: usize| Column::Numbers(rows.iter().map(|row| cell(&row.figures, k)).collect());
+        let mut columns: Vec<Column> = (0..measures).map(figures).collect();
         columns.push(Column::Text(rows.iter().map(|row| row.error.clone()).collect()));
-        columns.push(Column::Numbers(rows.iter().map(|row| row.wall_s).collect()));
+        columns.extend((0..times).map(|k| Column::Numbers(rows.iter().map(|row| cell(&row.times, k)).collect())));
         table.write(&columns)?;
         table.set_metadata(UNIT, unit.identity.to_string());
         let details = rows.iter().find_map(|row| row.details.as_deref());

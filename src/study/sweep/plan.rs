@@ -120,9 +120,15 @@ impl Plan {
         &self.axes
     }
 
-    /// The measures in the table of results: all but the computing time.
+    /// The measures in the table of results: all but computing times.
     pub(super) fn result_measures(&self) -> Vec<Measure> {
-        self.spec.measures.iter().copied().filter(|measure| *measure != Measure::WallS).collect()
+        self.spec.measures.iter().copied().filter(|measure| !measure.is_time()).collect()
+    }
+
+    /// The measures in the table of computing times: that of the run first, then those of the study.
+    pub(super) fn time_measures(&self) -> Vec<Measure> {
+        let others = self.spec.measures.iter().copied().filter(|of| of.is_time() && *of != Measure::WallS);
+        std::iter::once(Measure::WallS).chain(others).collect()
     }
 
     /// Time and memory limits of a run; `None` for closed forms.

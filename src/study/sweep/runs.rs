@@ -57,7 +57,7 @@ impl Sweep {
         let table = self.open_merged(&self.table())?;
         let Some(axis) = self.plan.axes().first() else { return Ok(Vec::new()) };
         let levels = table.column(&axis.name, ColumnType::Text)?.texts();
-        let values = table.column(measure.key(), ColumnType::Numbers)?.numbers();
+        let values = self.open_merged(&self.table_of(measure))?.column(measure.key(), ColumnType::Numbers)?.numbers();
         let at_level = levels.into_iter().zip(values).filter(|(of, _)| of.as_deref() == Some(level));
         Ok(at_level.map(|(_, value)| value).collect())
     }

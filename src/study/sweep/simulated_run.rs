@@ -77,14 +77,14 @@ pub(super) fn record_simulations(
 impl TemporaryRecording {
     /// Evaluates a run on this recording, read by thread `reader`.
     pub fn evaluate(&self, plan: &Plan, limit: LimitSpec, run: &Journey, reader: usize) -> RunOutcome {
-        let measures = plan.result_measures();
-        let compared = self.compared_with(limit, &measures, run, reader);
+        let compared = self.compared_with(limit, &plan.spec().measures, run, reader);
         let started = Instant::now();
-        let outcome = match compared.and_then(|compared| self.figures(limit, &measures, run, reader, &compared)) {
-            Ok((figures, details)) => RunOutcome { figures, details, ..RunOutcome::default() },
-            Err(error) => RunOutcome::from_error(measures.len(), &error),
+        let outcome = match compared.and_then(|compared| self.outcome(plan, limit, run, reader, &compared)) {
+            Ok(outcome) => outcome,
+            Err(error) => RunOutcome::from_error(plan.result_measures().len(), &error),
         };
-        RunOutcome { wall_s: Some(started.elapsed().as_secs_f64()), ..outcome }
+        let wall_s = Some(started.elapsed().as_secs_f64());
+        RunOutcome { times: std::iter::once(wall_s).chain(outcome.times).collect(), ..outcome }
     }
 
     /// What several runs on this recording are compared with.
@@ -105,14 +105,16 @@ impl TemporaryRecording {
         })
     }
 
-    fn figures(
+    /// The outcome of a run, without its computing time.
+    fn outcome(
         &self,
+        plan: &Plan,
         limit: LimitSpec,
-        measures: &[Measure],
         run: &Journey,
         reader: usize,
         compared: &Compared,
-    ) -> Result<(Vec<Option<f64>>, Option<String>), StudyError> {
+    ) -> Result<RunOutcome, StudyError> {
+        let measures = &plan.spec().measures;
         let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
         let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
             true => Some(self.swing()?),
@@ -128,7 +130,7 @@ impl TemporaryRecording {
                     let inputs = RunInputs {
                         simulation: &self.simulation,
                         journey: run,
-                        closes_loops: measures.contains(&Measure::ClosedPositionRmseM) || slam_bound_m.is_some(),
+                        closes_loops: measures.iter().any(|measure| measure.needs_closed_loop()),
                         slam_bound_m,
                         reference: compared.reference.as_deref(),
                     };
@@ -148,7 +150,9 @@ impl TemporaryRecording {
         let has_curve = measures.iter().any(|measure| measure.has_clock_curve());
         let curve = estimated.as_ref().filter(|_| has_curve).and_then(|estimated| estimated.clock_curve.as_ref());
         let details = map_errors.as_ref().map(spec::to_text).or_else(|| curve.map(spec::to_text)).transpose()?;
-        Ok((measures.iter().map(figure).collect(), details))
+        let figures = plan.result_measures().iter().map(figure).collect();
+        let times = plan.time_measures().iter().skip(1).map(figure).collect();
+        Ok(RunOutcome { figures, times, details, ..RunOutcome::default() })
     }
 
     /// Estimates with timing errors on one thread, and evaluates the result.

@@ -149,8 +149,7 @@ impl Sweep {
 
     /// A measure of all rows of the merged table; missing figures are [`Measure::missing_value`].
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
-        let path = if measure == Measure::WallS { self.times() } else { self.table() };
-        let table = self.open_merged(&path)?;
+        let table = self.open_merged(&self.table_of(measure))?;
         let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
         Ok(cells.into_iter().map(|cell| cell.unwrap_or(measure.missing_value())).collect())
     }
