@@ -11,6 +11,7 @@ use crate::geometry::{Pose, Trajectory, Vector};
 use crate::report;
 use crate::report::page::RunPage;
 use crate::report::plot::Figure;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -72,9 +73,7 @@ fn outline<'a>(
 pub(super) fn write(folder: &Path, plots: &[Plot], page: &RunPage) -> Result<(), StudyError> {
     let pictures = folder.join("plots");
     std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;
-    for plot in plots {
-        plot.figure.save(&pictures, plot.name)?;
-    }
+    plots.par_iter().try_for_each(|plot| plot.figure.save(&pictures, plot.name))?;
     write_text(folder, &folder.join("report.html"), &page.html()?)?;
     write_text(folder, &folder.join(METRICS), &page.metrics.to_json()?)
 }

@@ -59,19 +59,11 @@ pub fn information_bound(
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(StudyError::Plan { what: "information bound", message });
     };
-    let mut truth = TruthCursor::new(reader.truth());
-    for measurement in reader.measurements(&selection) {
-        match measurement? {
-            Measurement::Imu(sample) => bound.add_imu_sample(&sample),
-            Measurement::Lidar(scan) => {
-                watch.check_stop()?;
-                let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
-                watch.progress(Stage::Bounding, done_s, Some(total_s));
-                bound.add_scan(&scan, &mut truth)?;
-            }
-        }
-    }
-    bound.finish()
+    bound.of_measurements(reader, &selection, &mut |stamp| {
+        watch.check_stop()?;
+        watch.progress(Stage::Bounding, stamp.seconds_since(first), Some(last.seconds_since(first)));
+        Ok(())
+    })
 }
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
@@ -143,13 +135,36 @@ impl<'a> BoundAccumulator<'a> {
         }
     }
 
+    /// The bound of all measurements of `selection`; `on_scan` is called with the stamp of each scan.
+    ///
+    /// # Errors
+    /// If the recording cannot be read, or if `on_scan` fails.
+    pub(super) fn of_measurements(
+        mut self,
+        reader: &Reader,
+        selection: &Selection,
+        on_scan: &mut dyn FnMut(Stamp) -> Result<(), StudyError>,
+    ) -> Result<RecordingBound, StudyError> {
+        let mut truth = TruthCursor::new(reader.truth());
+        for measurement in reader.measurements(selection) {
+            match measurement? {
+                Measurement::Imu(sample) => self.add_imu_sample(&sample),
+                Measurement::Lidar(scan) => {
+                    on_scan(scan.stamp)?;
+                    self.add_scan(&scan, &mut truth)?;
+                }
+            }
+        }
+        Ok(RecordingBound { bound: self.information.bound()?, beams: self.beams, rejected: self.rejected })
+    }
+
     /// Adds the next IMU sample.
-    pub(super) fn add_imu_sample(&mut self, sample: &ImuSample) {
+    fn add_imu_sample(&mut self, sample: &ImuSample) {
         self.information.add_imu_sample(self.clock.on_lidar_clock(sample.stamp), sample);
     }
 
     /// Adds the beams of the next scan.
-    pub(super) fn add_scan(&mut self, scan: &LidarScan, truth: &mut TruthCursor) -> Result<(), StudyError> {
+    fn add_scan(&mut self, scan: &LidarScan, truth: &mut TruthCursor) -> Result<(), StudyError> {
         let mut scan_motion = ScanMotion { first: scan.stamp - TRUTH_STEP, states: Vec::new() };
         let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
         let steps = (sweep.nanos() / TRUTH_STEP.nanos()).max(0) + 3;
@@ -169,11 +184,6 @@ impl<'a> BoundAccumulator<'a> {
             }
         }
         Ok(())
-    }
-
-    /// The bound of all measurements.
-    pub(super) fn finish(self) -> Result<RecordingBound, StudyError> {
-        Ok(RecordingBound { bound: self.information.bound()?, beams: self.beams, rejected: self.rejected })
     }
 
     /// The observation of a beam, if it hit a static surface.

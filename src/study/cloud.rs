@@ -216,7 +216,6 @@ mod tests {
             page_points: Vec::new(),
             filtered: true,
             sample: ends.iter().map(judged).collect(),
-            bound: None,
         };
         let metrics = cloud_metrics(&registered, Some(&Pose::identity()), Some(surroundings));
         assert_eq!((metrics.on_carrier_fraction, metrics.on_movers_fraction), (Some(0.15), Some(0.05)));

@@ -1,7 +1,8 @@
 //! Estimation from a recording, with evaluation and output files.
 
+use super::background::with_background;
 use super::best_estimate::BestEstimate;
-use super::bound::BoundAccumulator;
+use super::bound::{BoundAccumulator, RecordingBound};
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
@@ -118,12 +119,12 @@ pub(super) fn estimate_in(
     let inputs = LoopInputs { reader, selection, found: &found, options, origin };
     let mut bound = inputs.bound()?;
     let loops = inputs.run(bound.as_mut(), folder, watch)?;
-    let registered = inputs.register(&loops, bound, folder, watch)?;
+    let (registered, bound) = inputs.register(&loops, bound, folder, watch)?;
     let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
 
     watch.progress(Stage::Reporting, 0.0, None);
     let imu_only_drift = truth.and_then(|truth| comparison::imu_only(run, truth, watch));
-    let bound = registered.bound.as_ref().map(|recording| &recording.bound);
+    let bound = bound.as_ref().map(|recording| &recording.bound);
     let bound_rmse_m = bound.map(|bound| bound.aligned_position_rmse_m);
     let fixed_views = Some(options.estimator.fixed_views as u64);
     let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
@@ -184,14 +185,14 @@ impl<'a> LoopInputs<'a> {
         .map(Some)
     }
 
-    /// Registers the cloud along the best estimate, and completes `bound` if the truth is known.
+    /// Registers the cloud along the best estimate, and meanwhile completes `bound` if the truth is known.
     fn register(
         &self,
         loops: &Loops,
         bound: Option<BoundAccumulator>,
         folder: &Path,
         watch: &mut ProgressMonitor,
-    ) -> Result<RegisteredCloud, StudyError> {
+    ) -> Result<(RegisteredCloud, Option<RecordingBound>), StudyError> {
         let (best, with_truth) = (loops.best(), loops.truth.is_some());
         let registration = Registration {
             reader: self.reader,
@@ -205,7 +206,13 @@ impl<'a> LoopInputs<'a> {
             with_truth,
             options: self.options.cloud,
         };
-        registration.run(bound.filter(|_| with_truth), folder, watch)
+        let stop = watch.stop;
+        let complete = || {
+            let bound = bound.filter(|_| with_truth)?;
+            Some(bound.of_measurements(self.reader, self.selection, &mut |_| super::progress::check(stop)))
+        };
+        let (bound, registered) = with_background(complete, || registration.run(folder, watch));
+        Ok((registered?, bound.transpose()?))
     }
 
     /// Runs both loops and writes the trajectories and the map to `folder`.

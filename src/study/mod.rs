@@ -9,6 +9,7 @@
 
 mod artefacts;
 mod atomic_file;
+mod background;
 mod base;
 mod best_estimate;
 mod bound;

@@ -71,6 +71,11 @@ pub struct ProgressMonitor<'a> {
     pub report: &'a mut dyn FnMut(StudyEvent),
 }
 
+/// Fails with [`StudyError::Stopped`] if the experiment is to stop.
+pub(super) fn check(stop: &AtomicBool) -> Result<(), StudyError> {
+    if stop.load(Ordering::Relaxed) { Err(StudyError::Stopped) } else { Ok(()) }
+}
+
 impl ProgressMonitor<'_> {
     pub(super) fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
@@ -78,7 +83,7 @@ impl ProgressMonitor<'_> {
 
     /// Fails with [`StudyError::Stopped`] if the experiment is to stop.
     pub(super) fn check_stop(&self) -> Result<(), StudyError> {
-        if self.is_stopped() { Err(StudyError::Stopped) } else { Ok(()) }
+        check(self.stop)
     }
 
     pub(super) fn progress(&mut self, stage: Stage, done_s: f64, total_s: Option<f64>) {

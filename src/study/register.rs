@@ -1,14 +1,14 @@
 //! Registration of the beams into a cloud: output files, points for viewers, and what the evaluation needs of them.
 
-use super::bound::{BoundAccumulator, RecordingBound};
 use super::cloud_files::{CloudFiles, CloudOptions};
+use super::read_ahead::{MeasurementStream, read_ahead};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{ProgressMonitor, Stage, StudyError};
 use crate::estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 use crate::evaluation::Thinning;
 use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
 use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
-use crate::recording::{CloudPoint, Measurements, Reader, RecordingError, Selection, write_result};
+use crate::recording::{CloudPoint, Reader, RecordingError, Selection, write_result};
 use crate::report::page::MAX_PAGE_POINTS;
 use crate::time::{Span, Stamp};
 use std::path::Path;
@@ -73,8 +73,6 @@ pub(super) struct RegisteredCloud {
     pub sample: Vec<SampledBeam>,
     /// Points for the page, after filtering.
     pub page_points: Vec<CloudPoint>,
-    /// The information bound, if it was requested.
-    pub bound: Option<RecordingBound>,
 }
 
 /// Inputs of the registration.
@@ -97,17 +95,19 @@ pub(super) struct Registration<'a> {
 
 impl Registration<'_> {
     /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
-    ///
-    /// The same pass over the recording adds the measurements to `bound`, which has the truth already.
-    pub(super) fn run(
+    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<RegisteredCloud, StudyError> {
+        read_ahead(self.reader, self.selection, |measurements| self.project(measurements, folder, watch)).0
+    }
+
+    fn project(
         &self,
-        bound: Option<BoundAccumulator>,
+        measurements: &mut MeasurementStream,
         folder: &Path,
         watch: &mut ProgressMonitor,
     ) -> Result<RegisteredCloud, StudyError> {
         let noise = self.calibration.lidar;
         let mut beams = BeamProjection {
-            measurements: self.reader.measurements(self.selection),
+            measurements,
             cursor: SmoothCursor::with_max_gap(self.map_from_head, Span::from_seconds(MAX_POSE_GAP_S)),
             truth: self.with_truth.then(|| TruthCursor::new(self.reader.truth())),
             calibrated: LidarModel::calibrated(self.calibration),
@@ -119,7 +119,6 @@ impl Registration<'_> {
             sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
             displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
             on_page: Thinning::to_at_most(MAX_PAGE_POINTS, self.returns),
-            bound,
             ready: Vec::new().into_iter(),
             span: self.map_from_head.span(),
             projected: 0,
@@ -136,9 +135,8 @@ impl Registration<'_> {
         }
         beams.files.finish()?;
         let filtered = !self.options.keep_outliers;
-        let BeamProjection { class_counts, sample, page_points, bound, .. } = beams;
-        let bound = bound.map(BoundAccumulator::finish).transpose()?;
-        Ok(RegisteredCloud { class_counts, filtered, sample, page_points, bound })
+        let BeamProjection { class_counts, sample, page_points, .. } = beams;
+        Ok(RegisteredCloud { class_counts, filtered, sample, page_points })
     }
 }
 
@@ -157,8 +155,8 @@ struct Pending {
 }
 
 /// Projects the recording scan by scan, writes the cloud files, and iterates over the points for viewers.
-struct BeamProjection<'a, 'w, 's> {
-    measurements: Measurements<'a>,
+struct BeamProjection<'a, 'm, 'w, 's> {
+    measurements: &'m mut MeasurementStream<'m>,
     cursor: SmoothCursor<'a>,
     truth: Option<TruthCursor<'a>>,
     /// The lidar as calibrated, for projection by the truth.
@@ -173,7 +171,6 @@ struct BeamProjection<'a, 'w, 's> {
     sampled: Thinning,
     displayed: Thinning,
     on_page: Thinning,
-    bound: Option<BoundAccumulator<'a>>,
     ready: std::vec::IntoIter<CloudPoint>,
     span: Option<(Stamp, Stamp)>,
     /// Number of projected returns.
@@ -185,7 +182,7 @@ struct BeamProjection<'a, 'w, 's> {
     watch: &'w mut ProgressMonitor<'s>,
 }
 
-impl Iterator for BeamProjection<'_, '_, '_> {
+impl Iterator for BeamProjection<'_, '_, '_, '_> {
     type Item = CloudPoint;
 
     fn next(&mut self) -> Option<CloudPoint> {
@@ -205,7 +202,7 @@ impl Iterator for BeamProjection<'_, '_, '_> {
     }
 }
 
-impl BeamProjection<'_, '_, '_> {
+impl BeamProjection<'_, '_, '_, '_> {
     /// Processes the next scan and returns its points for viewers.
     fn next_scan(&mut self) -> Result<Option<Vec<CloudPoint>>, StudyError> {
         loop {
@@ -214,9 +211,7 @@ impl BeamProjection<'_, '_, '_> {
                     let Some(filter) = self.filter.take() else { return Ok(None) };
                     return Ok(Some(self.settle(filter.finish())?));
                 }
-                Some(Measurement::Imu(sample)) => {
-                    self.bound.iter_mut().for_each(|bound| bound.add_imu_sample(&sample));
-                }
+                Some(Measurement::Imu(_)) => {}
                 Some(Measurement::Lidar(scan)) => {
                     if self.watch.is_stopped() {
                         return Err(StudyError::Stopped);
@@ -225,11 +220,7 @@ impl BeamProjection<'_, '_, '_> {
                         let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
                         self.watch.progress(Stage::Registering, done_s, Some(total_s));
                     }
-                    let points = self.register(&scan)?;
-                    if let (Some(bound), Some(truth)) = (&mut self.bound, &mut self.truth) {
-                        bound.add_scan(&scan, truth)?;
-                    }
-                    return Ok(Some(points));
+                    return Ok(Some(self.register(&scan)?));
                 }
             }
         }

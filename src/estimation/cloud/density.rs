@@ -11,6 +11,15 @@ const COARSEST_LEVEL: u32 = 3;
 /// Minimum number of points in the neighbourhood, including the point itself.
 const MIN_POINTS: u32 = 4;
 
+/// Number of cells that are compared one by one in a search.
+const NEXT_CELLS: usize = 12;
+
+/// Level of the cells for a point at this range.
+fn level_at(range_m: f64) -> u32 {
+    let doublings = (1..=COARSEST_LEVEL).filter(|level| range_m > FINEST_RANGE_M * f64::from(1_u32 << (level - 1)));
+    doublings.count() as u32
+}
+
 /// Number of points of a block in each finest cell.
 #[derive(Debug)]
 pub(super) struct BlockCounts {
@@ -60,11 +69,14 @@ impl Density {
         Self { codes: cells.into_iter().map(|(code, _)| code).collect(), cumulative }
     }
 
-    /// Whether a point has enough neighbours in the eight nearest cells of the level that fits its range.
-    pub(super) fn is_sufficient_at(&self, hit: &ProjectedReturn) -> bool {
-        let level = (hit.range_m() / FINEST_RANGE_M).log2().ceil().clamp(0.0, f64::from(COARSEST_LEVEL)) as u32;
-        // The own cell suffices for most points.
-        self.count(&hit.point_in_map, level) >= MIN_POINTS || self.count_around(&hit.point_in_map, level) >= MIN_POINTS
+    /// Whether a point of a block has enough neighbours in the eight nearest cells of the level that fits its range.
+    ///
+    /// `of_block` is the density of its block alone.
+    pub(super) fn is_sufficient_at(&self, hit: &ProjectedReturn, of_block: &Self) -> bool {
+        let level = level_at(hit.range_m());
+        // The points of its block in its own cell suffice for most points, and are counted fastest.
+        [of_block, self].iter().any(|density| density.count(&hit.point_in_map, level) >= MIN_POINTS)
+            || self.count_around(&hit.point_in_map, level) >= MIN_POINTS
     }
 
     /// Number of points in the cell of `level` that contains `point`.
@@ -72,7 +84,13 @@ impl Density {
         let code = morton_code(coordinates(point, level), level);
         let (first, last) = (code << (3 * level), (code + 1) << (3 * level));
         let from = self.codes.partition_point(|n| *n < first);
-        let until = from + self.codes[from..].partition_point(|n| *n < last);
+        // A cell contains few finest cells: look at the next ones before the others.
+        let next = &self.codes[from..(from + NEXT_CELLS).min(self.codes.len())];
+        let within = next.iter().take_while(|n| **n < last).count();
+        let until = match within {
+            NEXT_CELLS => from + self.codes[from..].partition_point(|n| *n < last),
+            _ => from + within,
+        };
         self.cumulative[until] - self.cumulative[from]
     }
 
@@ -102,7 +120,8 @@ mod tests {
             let at = Vector::new((k as f64 * 0.7).sin() * 20.0, (k as f64 * 0.9).cos() * 20.0, k as f64 * 0.1);
             let aside = |by_m: f64| hit(at + Vector::new(0.0, 0.6, 0.8) * by_m, 3.0);
             let sufficient = |hits: &[ProjectedReturn]| {
-                Density::from_blocks([BlockCounts::from_returns(hits)].iter()).is_sufficient_at(&hits[0])
+                let density = Density::from_blocks([BlockCounts::from_returns(hits)].iter());
+                density.is_sufficient_at(&hits[0], &density)
             };
             assert!(!sufficient(&[aside(0.0)]));
             assert!(!sufficient(&[aside(0.0), aside(0.01), aside(0.02)]));
@@ -116,11 +135,12 @@ mod tests {
         let at = Vector::new(7.0, 8.0, 9.0);
         let far = |by_m: f64| hit(at + Vector::z() * by_m, 18.0);
         let blocks = [0.0, 0.12, -0.12, 0.15].map(|by_m| BlockCounts::from_returns(&[far(by_m)]));
-        assert!(Density::from_blocks(blocks.iter()).is_sufficient_at(&far(0.0)));
-        assert!(!Density::from_blocks(blocks[..3].iter()).is_sufficient_at(&far(0.0)));
-        assert!(
-            !Density::from_blocks(blocks.iter()).is_sufficient_at(&hit(at, 2.0)),
-            "at short range the neighbourhood is smaller"
-        );
+        let of_block = Density::from_blocks(blocks[..1].iter());
+        let sufficient = |blocks: &[BlockCounts], at: ProjectedReturn| {
+            Density::from_blocks(blocks.iter()).is_sufficient_at(&at, &of_block)
+        };
+        assert!(sufficient(&blocks, far(0.0)));
+        assert!(!sufficient(&blocks[..3], far(0.0)));
+        assert!(!sufficient(&blocks, hit(at, 2.0)), "at short range the neighbourhood is smaller");
     }
 }

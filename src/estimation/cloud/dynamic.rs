@@ -4,7 +4,7 @@
 //! a point is classified by the cells around it together.
 
 use super::ProjectedReturn;
-use super::cell::{EDGE_M, coordinates, coordinates_of};
+use super::cell::{EDGE_M, coordinates, coordinates_of, morton_code};
 use super::cell_set::{CellSet, Cube, cube_of};
 use super::density::{BlockCounts, Density};
 use crate::geometry::Vector;
@@ -50,11 +50,11 @@ fn collect(cells_of: impl Iterator<Item = [i64; 3]>) -> CellSet {
     cells
 }
 
-/// Points of a block in dynamic and in static cells.
+/// The finest cells of a block whose points are on dynamic objects.
 #[derive(Debug)]
 pub(super) struct DynamicCells {
-    dynamic: Density,
-    fixed: Density,
+    /// Morton codes, sorted.
+    cells: Vec<u64>,
 }
 
 impl DynamicCells {
@@ -68,13 +68,19 @@ impl DynamicCells {
             let cells = classified.iter().filter(|(.., moved)| *moved == is_dynamic);
             Density::from_blocks([BlockCounts::from_iter(cells.map(|(cell, points, _)| (*cell, *points)))].iter())
         };
-        Self { dynamic: density_of(true), fixed: density_of(false) }
+        let (dynamic, fixed) = (density_of(true), density_of(false));
+        // The eight nearest cells of a point are those of all points of its finest cell, as a coarse cell has two on an edge.
+        let is_dynamic = |(cell, _): &&(u64, u32)| {
+            let centre = Vector::from(coordinates_of(*cell, 0).map(|x| (x as f64 + 0.5) * EDGE_M));
+            let moved = dynamic.count_around(&centre, LEVEL);
+            moved > 0 && moved > DYNAMIC_RATIO * fixed.count_around(&centre, LEVEL)
+        };
+        Self { cells: cells.par_iter().with_min_len(512).filter(is_dynamic).map(|(cell, _)| *cell).collect() }
     }
 
     /// Whether a point is on a dynamic object.
     pub(super) fn contains(&self, point: &Vector) -> bool {
-        let dynamic = self.dynamic.count_around(point, LEVEL);
-        dynamic > 0 && dynamic > DYNAMIC_RATIO * self.fixed.count_around(point, LEVEL)
+        self.cells.binary_search(&morton_code(coordinates(point, 0), 0)).is_ok()
     }
 }
 

@@ -128,10 +128,11 @@ impl<T: Send + Sync> CloudFilter<T> {
         let density = Density::from_blocks(around().map(|block| &block.counts));
         let free_spaces: Vec<&FreeSpace> = around().map(|block| &block.free_space).collect();
         let block = &self.complete[self.classified];
+        let of_block = Density::from_blocks([&block.counts].into_iter());
         let dynamic = DynamicCells::find(&block.counts, &free_spaces);
         let class = |one: &PendingReturn<T>| match one {
             PendingReturn { mixed: true, .. } => ReturnClass::MixedPixel,
-            PendingReturn { hit, .. } if !density.is_sufficient_at(hit) => ReturnClass::Isolated,
+            PendingReturn { hit, .. } if !density.is_sufficient_at(hit, &of_block) => ReturnClass::Isolated,
             PendingReturn { hit, .. } if dynamic.contains(&hit.point_in_map) => ReturnClass::Dynamic,
             _ => ReturnClass::Static,
         };

@@ -75,10 +75,10 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         let margin = reach.ceil() as i32;
         let (along, colour) = ((f64::from(b.0 - a.0), f64::from(b.1 - a.1)), rgb(colour));
         let length2 = along.0 * along.0 + along.1 * along.1;
-        let distance = |x: i32, y: i32| {
+        let distance2 = |x: i32, y: i32| {
             let to = (f64::from(x - a.0), f64::from(y - a.1));
             let u = ((to.0 * along.0 + to.1 * along.1) / length2).clamp(0.0, 1.0);
-            (to.0 - u * along.0).hypot(to.1 - u * along.1)
+            (to.0 - u * along.0).powi(2) + (to.1 - u * along.1).powi(2)
         };
         for y in a.1.min(b.1) - margin..=a.1.max(b.1) + margin {
             // Visit only the columns near the part of the segment that crosses this row.
@@ -92,7 +92,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
                 false => (at_row(top).min(at_row(bottom)), at_row(top).max(at_row(bottom))),
             };
             for x in x0.floor() as i32 - margin..=x1.ceil() as i32 + margin {
-                if distance(x, y) <= reach {
+                if distance2(x, y) <= reach * reach {
                     self.area.draw_pixel((x, y), &colour).map_err(PlotError::drawing)?;
                 }
             }
