@@ -25,7 +25,7 @@ const MAX_ELEMENTS: u64 = 1000;
 #[command(
     group = ArgGroup::new("scheduler").required(true),
     after_help = "Examples:\n  zsim sweep submit results/springs --slurm --elements 16\n  \
-                  zsim sweep submit /sweeps/springs --kubernetes --image registry.example.org/zsim --claim sweeps --dry-run"
+                  zsim sweep submit /data/springs --kubernetes --image zsim:1 --claim data"
 )]
 pub(super) struct Arguments {
     /// Folder of the sweep, created by `zsim sweep plan`
