@@ -6,6 +6,7 @@
 mod arguments;
 mod bars;
 mod base;
+mod benchmark;
 mod bound;
 mod check;
 mod compare;
@@ -77,6 +78,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Compare(compare::Arguments),
     Base(base::Arguments),
+    Benchmark(benchmark::Arguments),
     Bound(bound::Arguments),
     Gains(gains::Arguments),
     Spring(spring::Arguments),
@@ -125,6 +127,7 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Evaluate(arguments) => evaluate::run(arguments, global),
         Command::Compare(arguments) => compare::run(arguments, global),
         Command::Base(arguments) => base::run(arguments, global),
+        Command::Benchmark(arguments) => benchmark::run(arguments, global),
         Command::Bound(arguments) => bound::run(arguments, global),
         Command::Gains(arguments) => gains::run(arguments, global),
         Command::Spring(arguments) => spring::run(arguments, global),

@@ -1,7 +1,7 @@
 //! Formats quantities with three significant digits and an SI prefix.
 
-/// Formats a length.
-pub(super) fn length(metres: f64) -> String {
+/// Formats a length in m.
+pub fn length(metres: f64) -> String {
     match metres.abs() {
         m if m < 0.0995 => format!("{} mm", digits(metres * 1e3)),
         m if m < 0.995 => format!("{} cm", digits(metres * 1e2)),

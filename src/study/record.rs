@@ -28,7 +28,26 @@ pub fn record(
     watch: &mut ProgressMonitor,
 ) -> Result<SimulationSummary, StudyError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
-    let files = FileSink { recording, truth: Some(TumWriter::create(truth)?), stop: watch.stop };
+    let truth = Some(TumWriter::create(truth)?);
+    run(simulation, FileSink { recording, truth, has_truth_inside: true, stop: watch.stop }, watch)
+}
+
+/// As [`record`], with the truth in the TUM file only.
+///
+/// # Errors
+/// As [`record`].
+pub(super) fn record_with_truth_apart(
+    simulation: &Simulation,
+    recording: &Path,
+    truth: &Path,
+    watch: &mut ProgressMonitor,
+) -> Result<(), StudyError> {
+    let recording = Writer::create(recording, description(simulation, false)?)?;
+    let truth = Some(TumWriter::create(truth)?);
+    run(simulation, FileSink { recording, truth, has_truth_inside: false, stop: watch.stop }, watch).map(drop)
+}
+
+fn run(simulation: &Simulation, files: FileSink, watch: &mut ProgressMonitor) -> Result<SimulationSummary, StudyError> {
     let duration_s = simulation.inputs().duration_s;
     watch.data(StageData::Start { stage: Stage::Simulating, calibration: &simulation.calibration() });
     let watch = RefCell::new(watch);
@@ -53,7 +72,7 @@ pub(super) fn record_together(
     recordings: Vec<Writer>,
     watch: &ProgressMonitor,
 ) -> Result<(), StudyError> {
-    let files = |recording| FileSink { recording, truth: None, stop: watch.stop };
+    let files = |recording| FileSink { recording, truth: None, has_truth_inside: true, stop: watch.stop };
     let mut all: Vec<FileSink> = recordings.into_iter().map(files).collect();
     let ran = Simulation::run_together(simulations, &mut all.iter_mut().collect::<Vec<_>>(), &mut |_| ());
     all.into_iter().try_for_each(FileSink::finish)?;
@@ -83,6 +102,8 @@ pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<Run
 struct FileSink<'a> {
     recording: Writer,
     truth: Option<TumWriter<BufWriter<File>>>,
+    /// Whether the truth is also in the recording.
+    has_truth_inside: bool,
     stop: &'a AtomicBool,
 }
 
@@ -116,10 +137,10 @@ impl TruthSink for FileSink<'_> {
         if let Some(truth) = &mut self.truth {
             truth.pose(sample.lidar_stamp, &sample.head.world_from_body)?;
         }
-        self.recording.truth(now, sample)
+        if self.has_truth_inside { self.recording.truth(now, sample) } else { Ok(()) }
     }
 
     fn clock(&mut self, now: Stamp, clock: &ClockTruth) -> Result<(), SinkError> {
-        self.recording.clock(now, clock)
+        if self.has_truth_inside { self.recording.clock(now, clock) } else { Ok(()) }
     }
 }

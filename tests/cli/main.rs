@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod benchmark;
 #[path = "../command/mod.rs"]
 mod command;
 mod commands;

@@ -6,6 +6,7 @@
 //! to scale, modes and stiffness. Scripts, style sheets and data are in the file. A content security policy forbids network
 //! access. The page of a run that is not complete is an exception: it requests updates from the server that it is from.
 
+mod benchmark;
 mod binary;
 mod data;
 mod encode;
@@ -24,6 +25,7 @@ mod table;
 mod update;
 
 use crate::report::rows;
+pub use benchmark::BenchmarkPage;
 pub use data::{
     Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Level, Link, Ordinate, RunPage, Section,
     ShownMode, SpringView, TimedPose, TimelineRow, View, ViewPoint,

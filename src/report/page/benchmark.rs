@@ -1,0 +1,54 @@
+//! The page of a benchmark: the errors of several systems on a suite of recordings.
+
+use super::PageTable;
+use super::html::{self, PagePlot};
+use super::scripts::{DATA, READY, TABLES};
+
+/// The page of a benchmark.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BenchmarkPage {
+    /// The result in a sentence or two.
+    pub summary: String,
+    /// One row per system: medians over the recordings.
+    pub systems: PageTable,
+    /// One row per recording and system.
+    pub runs: PageTable,
+    /// Plots.
+    pub plots: Vec<PagePlot>,
+}
+
+impl BenchmarkPage {
+    /// The HTML of the page; the same data give the same bytes.
+    pub fn html(&self) -> String {
+        let sections = [self.systems.section(), html::plots(&self.plots), self.runs.section()].concat();
+        html::Document {
+            kind: "paper",
+            title: "Benchmark",
+            status: "",
+            introduction: &html::summary(&self.summary),
+            without_scripts: "Sorting the tables needs scripts; nothing else does.",
+            sections: &sections,
+            footer: "Errors of the position after a rigid alignment with the truth, as evo_ape -a.",
+            version: env!("CARGO_PKG_VERSION"),
+            data: "{}",
+            scripts: &[DATA, TABLES, READY],
+        }
+        .html()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_become_markup() {
+        let hostile = || "\"><script>".to_owned();
+        let table =
+            || PageTable { header: vec![hostile()], rows: vec![vec![hostile()]], title: hostile(), links: Vec::new() };
+        let page = BenchmarkPage { summary: hostile(), systems: table(), runs: table(), plots: Vec::new() };
+        let html = page.html();
+        assert_eq!(html.matches("<script>").count(), 1, "that of the page");
+        assert_eq!(html.matches("&lt;script&gt;").count(), 7);
+    }
+}
