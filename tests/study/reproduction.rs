@@ -208,11 +208,16 @@ fn five_fixed_views_drift_less_than_none_in_the_smoke_test_of_motion_capture() {
     let (stop, on_progress) = (AtomicBool::new(false), |_: f64| {});
     let runner = Runner { program: Path::new(ZSIM), stop: &stop, on_progress: &on_progress };
     let result = experiment.run(here.path(), Extent::Quick, false, &runner).unwrap();
-    assert_eq!(result.rows.len(), 7);
-    let claim = result.rows[6].comparison.as_ref().unwrap();
+    assert_eq!(result.rows.len(), 10);
+    let claim = result.rows[9].comparison.as_ref().unwrap();
     assert!(claim.verdict == Verdict::Met && claim.median < 1.0, "{result:?}");
     let drift = result.rows[0].comparison.as_ref().unwrap();
     assert!(drift.paper == Some(75.0) && drift.unit == "mm/min" && drift.median > 0.0, "{drift:?}");
+    // Computing times, which are in a table of their own.
+    for (row, paper) in result.rows[6..9].iter().zip([62.0, 71.0, 73.0]) {
+        let time = row.comparison.as_ref().unwrap();
+        assert!(time.paper == Some(paper) && time.unit == "%" && time.median > 0.0 && time.median < paper, "{time:?}");
+    }
 }
 
 #[test]
