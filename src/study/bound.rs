@@ -12,7 +12,7 @@ use crate::recording::{Reader, Selection, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
 use crate::simulation::Run;
 use crate::time::{Span, Stamp};
-use crate::world::{Hit, PlaneMap, Ray, World};
+use crate::world::{Hit, PlaneMap, Ray, TimedRay, World};
 use rayon::prelude::*;
 
 /// Prior standard deviations of the clock offset, s, and the clock rate, s/s: wide, so that they carry no information.
@@ -22,6 +22,8 @@ const CLOCK_PRIOR: (f64, f64) = (0.1, 1e-3);
 const SAME_SURFACE_M: f64 = 0.15;
 /// A point within this distance of a moving object belongs to that object, m.
 const MOVER_DISTANCE_M: f64 = 0.05;
+/// Number of rays that are cast together: a multiple of the size of their groups, so that a thread has several groups.
+const RAYS_TOGETHER: usize = 272;
 /// Maximum number of glass panes on the path of a beam.
 const MAX_PANES: usize = 8;
 /// Time between the true poses of a scan: the period of the recorded truth.
@@ -172,8 +174,9 @@ impl<'a> BoundAccumulator<'a> {
             let stamp = scan_motion.first + Span::from_nanos(step * TRUTH_STEP.nanos());
             scan_motion.states.push(truth.at(stamp)?);
         }
+        let chunks = scan.returns.par_chunks(RAYS_TOGETHER);
         let beams: Vec<Option<BeamObservation>> =
-            scan.returns.par_iter().map(|hit| self.observation(scan, hit, &scan_motion)).collect();
+            chunks.flat_map_iter(|hits| self.observations(scan, hits, &scan_motion)).collect();
         for beam in beams {
             match beam {
                 Some(beam) => {
@@ -186,8 +189,26 @@ impl<'a> BoundAccumulator<'a> {
         Ok(())
     }
 
-    /// The observation of a beam, if it hit a static surface.
-    fn observation(&self, scan: &LidarScan, hit: &LidarReturn, scan_motion: &ScanMotion) -> Option<BeamObservation> {
+    /// The observations of successive beams, each if it hit a static surface.
+    fn observations(
+        &self,
+        scan: &LidarScan,
+        hits: &[LidarReturn],
+        scan_motion: &ScanMotion,
+    ) -> Vec<Option<BeamObservation>> {
+        let beams: Vec<Option<TrueBeam>> = hits.iter().map(|hit| self.true_beam(scan, hit, scan_motion)).collect();
+        let rays: Vec<TimedRay> = beams.iter().flatten().map(TrueBeam::timed_ray).collect();
+        let mut first_hits = self.world.cast_all(&rays).into_iter();
+        let observation = |beam: Option<TrueBeam>| {
+            let beam = beam?;
+            let first = first_hits.next().flatten()?;
+            self.observation(&beam, first)
+        };
+        beams.into_iter().map(observation).collect()
+    }
+
+    /// A beam along the true ray; `None` at times without truth.
+    fn true_beam(&self, scan: &LidarScan, hit: &LidarReturn, scan_motion: &ScanMotion) -> Option<TrueBeam> {
         let stamp = scan.stamp + hit.offset;
         let motion = scan_motion.at(stamp)?;
         let world_from_laser = motion.world_from_head * self.calibration.head_from_laser;
@@ -197,7 +218,13 @@ impl<'a> BoundAccumulator<'a> {
             origin_in_world: world_from_laser.translation.vector,
             direction_in_world: world_from_laser.rotation * (point_in_laser / range_m),
         };
-        let surface = self.surface_at_range(&ray, range_m, motion.t_s)?;
+        Some(TrueBeam { stamp, motion, ray, range_m })
+    }
+
+    /// The observation of a beam, if it hit a static surface; `first` is the first surface on its ray.
+    fn observation(&self, beam: &TrueBeam, first: Hit) -> Option<BeamObservation> {
+        let TrueBeam { stamp, motion, ray, .. } = beam;
+        let surface = self.surface_at_range(beam, first)?;
         let hit_in_world = ray.at(surface.distance_m);
         let plane = match &self.planes {
             None => 0,
@@ -205,7 +232,7 @@ impl<'a> BoundAccumulator<'a> {
         };
         let is_moving = self.world.distance_to_movers_m(&hit_in_world, MOVER_DISTANCE_M, motion.t_s).is_some();
         (!is_moving).then(|| BeamObservation {
-            stamp,
+            stamp: *stamp,
             world_from_head: motion.world_from_head,
             velocity_in_world: motion.velocity_in_world,
             angular_velocity_in_world: motion.angular_velocity_in_world,
@@ -217,10 +244,10 @@ impl<'a> BoundAccumulator<'a> {
         })
     }
 
-    /// The surface at the measured range along a ray, through glass panes if necessary.
-    fn surface_at_range(&self, ray: &Ray, range_m: f64, t_s: f64) -> Option<Hit> {
-        let reach_m = range_m + SAME_SURFACE_M;
-        let mut hit = self.world.cast(ray, reach_m, t_s)?;
+    /// The surface at the measured range of a beam, the `first` one on its ray or one behind glass panes.
+    fn surface_at_range(&self, beam: &TrueBeam, first: Hit) -> Option<Hit> {
+        let TrueBeam { ray, range_m, motion, .. } = beam;
+        let mut hit = first;
         for _ in 0..MAX_PANES {
             if (hit.distance_m - range_m).abs() <= SAME_SURFACE_M {
                 return Some(hit);
@@ -228,9 +255,25 @@ impl<'a> BoundAccumulator<'a> {
             if self.world.material(hit.material).transmission <= 0.0 {
                 return None;
             }
-            hit = self.world.cast_beyond(ray, hit.distance_m, reach_m, t_s)?;
+            hit = self.world.cast_beyond(ray, hit.distance_m, beam.timed_ray().reach_m, motion.t_s)?;
         }
         None
+    }
+}
+
+/// A measured beam along its true ray.
+struct TrueBeam {
+    stamp: Stamp,
+    motion: HeadMotion,
+    ray: Ray,
+    /// Measured range, m.
+    range_m: f64,
+}
+
+impl TrueBeam {
+    /// The ray, up to the farthest surface that the beam can have hit.
+    fn timed_ray(&self) -> TimedRay {
+        TimedRay { ray: self.ray, reach_m: self.range_m + SAME_SURFACE_M, t_s: self.motion.t_s }
     }
 }
 
