@@ -49,6 +49,6 @@ mod tests {
         let page = BenchmarkPage { summary: hostile(), systems: table(), runs: table(), plots: Vec::new() };
         let html = page.html();
         assert_eq!(html.matches("<script>").count(), 1, "that of the page");
-        assert_eq!(html.matches("&lt;script&gt;").count(), 7);
+        assert_eq!(html.matches("&lt;script&gt;").count(), 9);
     }
 }
