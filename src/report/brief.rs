@@ -23,7 +23,9 @@ fn accuracy(metrics: &Metrics) -> String {
         Some(format!("{name} {}{rotation}", length((*position_m)?)))
     });
     match known.collect::<Vec<_>>() {
-        known if known.is_empty() => "accuracy: unknown, no ground truth that the positions can be aligned with".to_owned(),
+        known if known.is_empty() => {
+            "accuracy: unknown, no ground truth that the positions can be aligned with".to_owned()
+        }
         known => format!("accuracy: {} (RMSE)", known.join(", ")),
     }
 }
@@ -47,7 +49,10 @@ mod tests {
     #[test]
     fn unknown_figures_are_left_out_or_said() {
         let mut metrics = Metrics { duration_s: 20.0, ..Metrics::default() };
-        assert_eq!(brief(&metrics), "20.0 s\naccuracy: unknown, no ground truth that the positions can be aligned with\n");
+        assert_eq!(
+            brief(&metrics),
+            "20.0 s\naccuracy: unknown, no ground truth that the positions can be aligned with\n"
+        );
         metrics.scene = Some("office".to_owned());
         metrics.status = Some("good".to_owned());
         metrics.open_loop.position_rmse_m = Some(0.0041);
