@@ -4,6 +4,7 @@ import _thread
 import gc
 import json
 import subprocess
+import signal
 import threading
 import time
 
@@ -192,12 +193,15 @@ def test_progress_reaches_the_end_and_an_exception_of_it_stops():
 
 
 def test_an_interrupt_stops_a_simulation():
+    # A shell starts background jobs with the signal ignored; Python then has no handler for it.
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     threading.Timer(0.5, _thread.interrupt_main).start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         # Takes minutes without the interrupt.
         zsim.simulate(scene="office", duration_s=36000.0)
     assert time.monotonic() - start < 20.0
+    signal.signal(signal.SIGINT, previous)
 
 
 def test_a_damaged_recording_is_a_warning(recording, tmp_path):
