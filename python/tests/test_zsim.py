@@ -197,11 +197,13 @@ def test_an_interrupt_stops_a_simulation():
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     threading.Timer(0.5, _thread.interrupt_main).start()
     start = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        # Takes minutes without the interrupt.
-        zsim.simulate(scene="office", duration_s=36000.0)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            # Takes minutes without the interrupt.
+            zsim.simulate(scene="office", duration_s=36000.0)
+    finally:
+        signal.signal(signal.SIGINT, previous)
     assert time.monotonic() - start < 20.0
-    signal.signal(signal.SIGINT, previous)
 
 
 def test_a_damaged_recording_is_a_warning(recording, tmp_path):

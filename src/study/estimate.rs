@@ -14,6 +14,7 @@ use super::map_options::MapOptions;
 use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::origin::Origin;
 use super::page::RunResults;
+use super::progress::check;
 use super::recorded_manifest::RecordedManifest;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
@@ -209,7 +210,7 @@ impl<'a> LoopInputs<'a> {
         let stop = watch.stop;
         let complete = || {
             let bound = bound.filter(|_| with_truth)?;
-            Some(bound.of_measurements(self.reader, self.selection, &mut |_| super::progress::check(stop)))
+            Some(bound.of_measurements(self.reader, self.selection, &mut |_| check(stop)))
         };
         let (bound, registered) = with_background(complete, || registration.run(folder, watch));
         Ok((registered?, bound.transpose()?))

@@ -1,21 +1,11 @@
 //! A sweep as an Indexed Job, run by a stand-in for Kubernetes that kills pods.
 
 use crate::command::run;
+use crate::slurm::SWEEP;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-
-const SWEEP: &str = r#"(
-    base: journey(
-        scene: "mocap_room", head: "handheld", motion: "hand", lidar: "utm30lx", imu: "3dm_gx2", clock: "drifting",
-        estimator: "default", duration_s: 6.0, limit: (time_s: 300.0, memory_mib: 1024),
-    ),
-    axes: [values(path: "head.wire_diameter_mm", values: [0.5, 2.8, 3.0, 3.2])],
-    sampling: grid,
-    seeds: [1, 2],
-    measures: [position_rmse_m, fraction_seen],
-)"#;
 
 fn zsim(folder: &Path, arguments: &str) -> String {
     let (code, stdout, stderr) = run(folder, arguments);
@@ -35,7 +25,7 @@ fn pod(job: &Value, index: u64) -> Child {
 #[test]
 fn an_indexed_job_with_killed_pods_gives_the_bytes_of_a_local_run() {
     let here = tempfile::tempdir().unwrap();
-    std::fs::write(here.path().join("s.ron"), SWEEP).unwrap();
+    std::fs::write(here.path().join("s.ron"), SWEEP.replace("seeds: [1]", "seeds: [1, 2]")).unwrap();
     for name in ["cluster", "local"] {
         zsim(here.path(), &format!("sweep plan s.ron -o {name}"));
     }

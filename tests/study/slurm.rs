@@ -50,7 +50,8 @@ fn zsim(cluster: Option<&Cluster>, folder: &Path, arguments: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-const SWEEP: &str = r#"(
+/// A sweep of four runs, one of which fails.
+pub(crate) const SWEEP: &str = r#"(
     base: journey(
         scene: "mocap_room", head: "handheld", motion: "hand", lidar: "utm30lx", imu: "3dm_gx2", clock: "drifting",
         estimator: "default", duration_s: 6.0, limit: (time_s: 300.0, memory_mib: 1024),
