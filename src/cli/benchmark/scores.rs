@@ -163,7 +163,6 @@ pub(super) fn page(suite: &Suite, systems: &[System], min_coverage: f64) -> Stri
             ..PageTable::default()
         },
         runs: PageTable { title: "Recordings".to_owned(), header: owned(header), rows: runs.map(run).collect(), ..PageTable::default() },
-        plots: Vec::new(),
     }
     .html()
 }

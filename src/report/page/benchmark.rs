@@ -1,7 +1,7 @@
 //! The page of a benchmark: the errors of several systems on a suite of recordings.
 
 use super::PageTable;
-use super::html::{self, PagePlot};
+use super::html;
 use super::scripts::{DATA, READY, TABLES};
 
 /// The page of a benchmark.
@@ -13,14 +13,12 @@ pub struct BenchmarkPage {
     pub systems: PageTable,
     /// One row per recording and system.
     pub runs: PageTable,
-    /// Plots.
-    pub plots: Vec<PagePlot>,
 }
 
 impl BenchmarkPage {
     /// The HTML of the page; the same data give the same bytes.
     pub fn html(&self) -> String {
-        let sections = [self.systems.section(), html::plots(&self.plots), self.runs.section()].concat();
+        let sections = [self.systems.section(), self.runs.section()].concat();
         html::Document {
             kind: "paper",
             title: "Benchmark",
@@ -46,7 +44,7 @@ mod tests {
         let hostile = || "\"><script>".to_owned();
         let table =
             || PageTable { header: vec![hostile()], rows: vec![vec![hostile()]], title: hostile(), links: Vec::new() };
-        let page = BenchmarkPage { summary: hostile(), systems: table(), runs: table(), plots: Vec::new() };
+        let page = BenchmarkPage { summary: hostile(), systems: table(), runs: table() };
         let html = page.html();
         assert_eq!(html.matches("<script>").count(), 1, "that of the page");
         assert_eq!(html.matches("&lt;script&gt;").count(), 9);
