@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs with zsim: docs/gallery.sh [FOLDER], by default docs/pictures.
 #
-# Needs zsim (ZSIM, by default target/release/zsim), Chromium, Node with playwright-core (target/ci-node, from .ci/run), and
+# Needs zsim (ZSIM, by default target/release/zsim), Chromium, Node with playwright-core (target/ci-node, from .ci/tools), and
 # Python with Pillow. Takes three minutes on two cores.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -19,7 +19,7 @@ fn the_page_of_a_run_works_in_a_browser_while_the_run_goes_on() {
     let _turn = turn();
     let here = tempfile::tempdir().unwrap();
     let scene = hostile_scene(here.path());
-    let arguments = format!("--quiet --scene {} --duration 120s --seed 3 --out out --live", scene.display());
+    let arguments = format!("--quiet --scene {} --duration 60s --seed 3 --out out --live", scene.display());
     use_in_a_browser(LiveRun::start(here.path(), &arguments));
 }
 
@@ -29,7 +29,7 @@ fn the_page_of_an_estimate_works_in_a_browser_while_it_goes_on() {
     let here = tempfile::tempdir().unwrap();
     let scene = hostile_scene(here.path());
     let recording = "<script>window.hostile=1;.mcap";
-    let arguments = format!("simulate --scene {} --duration 120s --seed 3 --out {recording}", scene.display());
+    let arguments = format!("simulate --scene {} --duration 60s --seed 3 --out {recording}", scene.display());
     let (code, _, errors) = run(here.path(), &arguments);
     assert_eq!(code, 0, "{errors}");
     use_in_a_browser(LiveRun::start(here.path(), &format!("--quiet estimate {recording} --out out --live")));
