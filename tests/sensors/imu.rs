@@ -171,12 +171,17 @@ fn still(spec: &ImuSpec, seed: u64, count: usize) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
+/// One degree per hour, rad/s.
+const RAD_PER_S_PER_DEG_PER_H: f64 = PI / 180.0 / 3600.0;
+/// Allan deviation of flicker noise in units of the bias instability, sqrt(2 ln 2 / pi) (IEEE Std 952).
+const FLOOR: f64 = 0.664;
+
 /// Parameters of the Allan variance of a sensor from its spec, in SI units.
 struct AllanOfSpec {
     density: f64,
     walk: f64,
-    /// Standard deviation and correlation time of the Gauss-Markov bias.
-    wander: Option<(f64, f64)>,
+    /// Bias instability.
+    instability: f64,
     /// Resolution of readings.
     resolution: f64,
     period_s: f64,
@@ -186,18 +191,17 @@ impl AllanOfSpec {
     /// Parameters of gyroscope and accelerometer.
     fn of(spec: &ImuSpec) -> [Self; 2] {
         let (noise, period_s) = (imu(spec).noise(), 1.0 / spec.rate_hz);
-        let wander = |wander: Option<GaussMarkovSpec>, unit: f64| wander.map(|w| (w.sigma * unit, w.time_s));
         let gyro = Self {
             density: noise.gyro_density_rad_per_s_per_sqrt_hz,
-            walk: noise.gyro_bias_walk_rad_per_s_per_sqrt_s,
-            wander: wander(spec.gyro.wander_deg_per_h, PI / 180.0 / 3600.0),
+            walk: spec.gyro.bias_walk_rad_per_s_per_sqrt_s,
+            instability: spec.gyro.bias_instability_deg_per_h * RAD_PER_S_PER_DEG_PER_H,
             resolution: spec.gyro.resolution_deg_per_s.to_radians(),
             period_s,
         };
         let accel = Self {
             density: noise.accel_density_m_per_s2_per_sqrt_hz,
-            walk: noise.accel_bias_walk_m_per_s2_per_sqrt_s,
-            wander: wander(spec.accel.wander_mg, 1e-3 * G),
+            walk: spec.accel.bias_walk_m_per_s2_per_sqrt_s,
+            instability: spec.accel.bias_instability_mg * 1e-3 * G,
             resolution: spec.accel.resolution_mg * 1e-3 * G,
             period_s,
         };
@@ -206,16 +210,12 @@ impl AllanOfSpec {
 
     /// Allan variance at `tau_s`, in squares of the SI unit: the sum over all noise sources.
     ///
-    /// White noise gives N^2 / tau, a random walk K^2 tau / 3, and a Gauss-Markov process of standard deviation s and
-    /// correlation time T `2 s^2 T / tau (1 - T / (2 tau) (3 - 4 exp(-tau / T) + exp(-2 tau / T)))` (IEEE Std 952).
+    /// White noise gives N^2 / tau, a random walk K^2 tau / 3, and bias instability 2 ln(2) / pi B^2 (IEEE Std 952).
     /// Rounding to q adds q^2 / 12 per sample, which is white if the noise per sample is at least q.
     fn variance(&self, tau_s: f64) -> f64 {
         let rounding = self.resolution.powi(2) / 12.0 * self.period_s;
-        let wander = self.wander.map_or(0.0, |(sigma, time_s)| {
-            let x = tau_s / time_s;
-            2.0 * sigma * sigma / x * (1.0 - (3.0 - 4.0 * (-x).exp() + (-2.0 * x).exp()) / (2.0 * x))
-        });
-        (self.density.powi(2) + rounding) / tau_s + self.walk.powi(2) * tau_s / 3.0 + wander
+        let instability = FLOOR.powi(2) * self.instability.powi(2);
+        (self.density.powi(2) + rounding) / tau_s + self.walk.powi(2) * tau_s / 3.0 + instability
     }
 }
 
@@ -266,6 +266,29 @@ fn the_noise_of_consumer_and_tactical_imus_agrees_with_their_data_sheets() {
     assert_relative_eq!(noise.gyro_density_rad_per_s_per_sqrt_hz, (0.15_f64 / 60.0).to_radians(), max_relative = 1e-9);
     assert_relative_eq!(noise.accel_density_m_per_s2_per_sqrt_hz, 0.07 / 60.0, max_relative = 1e-3);
     assert_relative_eq!(noise.gyro_limit_rad_per_s, 400_f64.to_radians(), max_relative = 1e-12);
+}
+
+#[test]
+fn the_allan_deviation_of_a_bias_instability_is_flat_at_two_thirds_of_it() {
+    let mut spec = spec_of("ideal_1khz");
+    (spec.rate_hz, spec.gyro.bias_instability_deg_per_h, spec.accel.bias_instability_mg) = (2.0, 18.0, 0.04);
+    // Six hours; mean variance over 12 seeds, so that the relative standard error at 216 s is about 3 %.
+    let seeds = 12;
+    let (mut gyro, mut accel) = ([0.0; 4], [0.0; 4]);
+    for seed in 0..seeds {
+        let samples = still(&spec, seed, 6 * 3600 * 2);
+        for (sums, samples) in [(&mut gyro, samples.0), (&mut accel, samples.1)] {
+            let points = allan_deviation(&samples, spec.rate_hz, &[20, 60, 200, 432]);
+            sums.iter_mut().zip(points).for_each(|(sum, point)| *sum += point.deviation.powi(2) / seeds as f64);
+        }
+    }
+    for (gyro, accel) in gyro.iter().zip(accel) {
+        assert_relative_eq!(gyro.sqrt(), FLOOR * 18.0 * RAD_PER_S_PER_DEG_PER_H, max_relative = 0.10);
+        assert_relative_eq!(accel.sqrt(), FLOOR * 0.04e-3 * G, max_relative = 0.10);
+    }
+    // An estimator that expects a random walk gets the one with the same deviation after 100 s.
+    let walk = imu(&spec).noise().gyro_bias_walk_rad_per_s_per_sqrt_s;
+    assert_relative_eq!(walk * (100.0_f64 / 3.0).sqrt(), FLOOR * 18.0 * RAD_PER_S_PER_DEG_PER_H, max_relative = 1e-3);
 }
 
 #[test]

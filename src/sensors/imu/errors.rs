@@ -7,9 +7,9 @@ use rand_distr::{Distribution, StandardNormal};
 /// Errors of an IMU in one run, sampled with a seed: scale, misalignment, and biases that change over time.
 ///
 /// A sample over `dt` is `round(clamp((I + S + M) true + bias + white))`, with white noise of `density / sqrt(dt)`. The
-/// bias follows a random walk, `b' = b + walk sqrt(dt) w`, plus an optional Gauss-Markov process,
-/// `b' = phi b + sigma sqrt(1 - phi^2) w` with `phi = exp(-dt / time)`. The noise model is that of Kalibr. `S` (scale
-/// errors) is diagonal; `M` (misalignments) has the other six entries.
+/// bias follows a random walk, `b' = b + walk sqrt(dt) w`, as Kalibr writes it, plus an optional Gauss-Markov process,
+/// `b' = phi b + sigma sqrt(1 - phi^2) w` with `phi = exp(-dt / time)`, plus the bias instability, a sum of such processes.
+/// `S` (scale errors) is diagonal; `M` (misalignments) has the other six entries.
 #[derive(Debug, Clone)]
 pub struct ImuErrors {
     gyro: Triad,
@@ -36,25 +36,33 @@ impl ImuErrors {
 
     /// Biases of the next sample: gyroscope, rad/s, and accelerometer, m/s^2.
     pub fn biases(&self) -> (Vector, Vector) {
-        (self.gyro.bias + self.gyro.gauss_markov_bias, self.accel.bias + self.accel.gauss_markov_bias)
+        (self.gyro.bias(), self.accel.bias())
     }
 }
 
 #[derive(Debug, Clone)]
 struct Triad {
     response: Matrix,
-    bias: Vector,
-    gauss_markov_bias: Vector,
+    /// The constant part of the bias and its random walk.
+    walking_bias: Vector,
+    wandering_biases: Vec<WanderingBias>,
     /// Standard deviation per sample; so is `walk_sigma`.
     white_sigma: f64,
     walk_sigma: f64,
-    /// Decay factor of the Gauss-Markov bias per sample, and standard deviation of the increment.
-    gauss_markov: Option<(f64, f64)>,
     limit: f64,
     resolution: f64,
     white: Stream,
     walk: Stream,
-    gauss_markov_noise: Stream,
+    wander: Stream,
+}
+
+/// A Gauss-Markov process, sampled.
+#[derive(Debug, Clone)]
+struct WanderingBias {
+    value: Vector,
+    /// Decay factor per sample, and standard deviation of the increment.
+    decay: f64,
+    sigma: f64,
 }
 
 impl Triad {
@@ -69,34 +77,36 @@ impl Triad {
             lower.x, 0.0, upper.z,
             lower.y, lower.z, 0.0,
         ) * model.misalignment;
-        let mut gauss_markov_noise = stream("wander");
-        let gauss_markov_bias = model
-            .gauss_markov
-            .map_or(Vector::zeros(), |gauss_markov| normal(&mut gauss_markov_noise) * gauss_markov.sigma);
+        let mut wander = stream("wander");
+        let wandering_biases = model.processes().map(|process| {
+            let decay = (-dt_s / process.time_s).exp();
+            let value = normal(&mut wander) * process.sigma;
+            WanderingBias { value, decay, sigma: process.sigma * (1.0 - decay * decay).sqrt() }
+        });
+        let wandering_biases = wandering_biases.collect();
         Self {
             response,
-            bias: normal(&mut stream("turn_on")) * model.turn_on,
-            gauss_markov_bias,
+            walking_bias: normal(&mut stream("turn_on")) * model.turn_on,
+            wandering_biases,
             white_sigma: model.density / dt_s.sqrt(),
             walk_sigma: model.walk * dt_s.sqrt(),
-            gauss_markov: model.gauss_markov.map(|gauss_markov| {
-                let phi = (-dt_s / gauss_markov.time_s).exp();
-                (phi, gauss_markov.sigma * (1.0 - phi * phi).sqrt())
-            }),
             limit: model.limit,
             resolution: model.resolution,
             white: stream("white"),
             walk: stream("walk"),
-            gauss_markov_noise,
+            wander,
         }
     }
 
+    fn bias(&self) -> Vector {
+        self.wandering_biases.iter().fold(self.walking_bias, |sum, wandering| sum + wandering.value)
+    }
+
     fn measure(&mut self, ideal: &Vector) -> Vector {
-        let noisy =
-            self.response * ideal + self.bias + self.gauss_markov_bias + normal(&mut self.white) * self.white_sigma;
-        self.bias += normal(&mut self.walk) * self.walk_sigma;
-        if let Some((decay, sigma)) = self.gauss_markov {
-            self.gauss_markov_bias = self.gauss_markov_bias * decay + normal(&mut self.gauss_markov_noise) * sigma;
+        let noisy = self.response * ideal + self.bias() + normal(&mut self.white) * self.white_sigma;
+        self.walking_bias += normal(&mut self.walk) * self.walk_sigma;
+        for wandering in &mut self.wandering_biases {
+            wandering.value = wandering.value * wandering.decay + normal(&mut self.wander) * wandering.sigma;
         }
         noisy.map(|x| self.quantised(x).clamp(-self.limit, self.limit))
     }

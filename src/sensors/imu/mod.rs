@@ -51,13 +51,13 @@ impl Imu {
         self.spec.averaging
     }
 
-    /// Noise model for an estimator.
+    /// Noise model for an estimator; its bias walks include the other changes of the biases during a run.
     pub fn noise(&self) -> ImuNoise {
         ImuNoise {
             gyro_density_rad_per_s_per_sqrt_hz: self.gyro.density,
             accel_density_m_per_s2_per_sqrt_hz: self.accel.density,
-            gyro_bias_walk_rad_per_s_per_sqrt_s: self.gyro.walk,
-            accel_bias_walk_m_per_s2_per_sqrt_s: self.accel.walk,
+            gyro_bias_walk_rad_per_s_per_sqrt_s: self.gyro.expected_walk(),
+            accel_bias_walk_m_per_s2_per_sqrt_s: self.accel.expected_walk(),
             gyro_turn_on_bias_rad_per_s: self.gyro.turn_on,
             accel_turn_on_bias_m_per_s2: self.accel.turn_on,
             gyro_limit_rad_per_s: self.gyro.limit,

@@ -11,6 +11,9 @@ const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
 /// One thousandth of standard gravity, m/s^2.
 const MILLI_G: f64 = STANDARD_GRAVITY_M_PER_S2 * 1e-3;
 
+/// One degree per hour, rad/s.
+const RAD_PER_S_PER_DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
+
 /// An inertial measurement unit, by the data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +47,10 @@ pub struct GyroSpec {
     /// Random walk of the bias, rad/s/sqrt(s).
     #[serde(with = "checked::NonNegative")]
     pub bias_walk_rad_per_s_per_sqrt_s: f64,
-    /// Additional Gauss-Markov bias (bias instability), deg/h.
+    /// Bias instability (in-run stability), deg/h: flicker noise with an Allan deviation of 0.664 times this value.
+    #[serde(default, with = "checked::NonNegative")]
+    pub bias_instability_deg_per_h: f64,
+    /// Additional Gauss-Markov bias, deg/h.
     pub wander_deg_per_h: Option<GaussMarkovSpec>,
     /// Standard deviation of the scale error, per cent.
     #[serde(with = "checked::NonNegative")]
@@ -73,7 +79,10 @@ pub struct AccelSpec {
     /// Random walk of the bias, m/s^2/sqrt(s).
     #[serde(with = "checked::NonNegative")]
     pub bias_walk_m_per_s2_per_sqrt_s: f64,
-    /// Additional Gauss-Markov bias (bias instability), mg.
+    /// Bias instability (in-run stability), mg: flicker noise with an Allan deviation of 0.664 times this value.
+    #[serde(default, with = "checked::NonNegative")]
+    pub bias_instability_mg: f64,
+    /// Additional Gauss-Markov bias, mg.
     pub wander_mg: Option<GaussMarkovSpec>,
     /// Standard deviation of the scale error, per cent.
     #[serde(with = "checked::NonNegative")]
@@ -129,7 +138,8 @@ impl GyroSpec {
             density: self.density_deg_per_s_per_sqrt_hz.to_radians(),
             turn_on: self.turn_on_bias_deg_per_s.to_radians(),
             walk: self.bias_walk_rad_per_s_per_sqrt_s,
-            gauss_markov: self.wander_deg_per_h.map(|w| w.model((1.0_f64 / 3600.0).to_radians())),
+            gauss_markov: self.wander_deg_per_h.map(|w| w.model(RAD_PER_S_PER_DEG_PER_H)),
+            instability: self.bias_instability_deg_per_h * RAD_PER_S_PER_DEG_PER_H,
             scale: self.scale_percent * 1e-2,
             misalignment: self.misalignment_deg.to_radians(),
             limit: self.limit_deg_per_s.to_radians(),
@@ -145,6 +155,7 @@ impl AccelSpec {
             turn_on: self.turn_on_bias_mg * MILLI_G,
             walk: self.bias_walk_m_per_s2_per_sqrt_s,
             gauss_markov: self.wander_mg.map(|w| w.model(MILLI_G)),
+            instability: self.bias_instability_mg * MILLI_G,
             scale: self.scale_percent * 1e-2,
             misalignment: self.misalignment_deg.to_radians(),
             limit: self.limit_g * STANDARD_GRAVITY_M_PER_S2,
