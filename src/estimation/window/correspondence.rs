@@ -142,7 +142,7 @@ impl Matches {
         &self.of_surfels[self.offsets[surfel]..self.offsets[surfel + 1]]
     }
 
-    pub fn planes(&self) -> impl Iterator<Item = &Plane> {
+    pub fn planes(&self) -> impl Iterator<Item = &Plane> + Clone {
         self.all.iter().map(|one| &one.plane)
     }
 }

@@ -1,13 +1,13 @@
 //! The window's iterations: place the surfels, match, solve, until the correction converges.
 
 use super::Window;
-use super::correspondence::{Counterpart, Matches, Neighbours};
+use super::correspondence::{Counterpart, Match, Matches, Neighbours};
 use super::equations::Robust;
 use super::linearised::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::matched::{MIN_SIGNIFICANT_TILT, Plane};
-use crate::estimation::surfel::PlacedSurfel;
+use crate::estimation::surfel::{FINE, PlacedSurfel};
 use crate::estimation::timing::{Stopwatch, Timing};
 use crate::estimation::views::Views;
 use crate::geometry::{Matrix, Vector};
@@ -65,7 +65,7 @@ impl Window {
             solved.timing.neighbours_s += watch.lap_s();
             let matches = self.match_up(&scene, views, &neighbours, iteration);
             let robust = Robust::of(&self.spec.solve, iteration);
-            solved.record(&matches, &robust);
+            solved.record(&matches, &robust, &scene);
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
             let matches = self.significant(matches, &solved, &scene, views);
             solved.timing.matches_s += watch.lap_s();
@@ -144,30 +144,38 @@ impl Window {
 }
 
 impl WindowSolution {
-    /// Records number, residual and conditioning of a set of matches.
-    fn record(&mut self, matches: &Matches, robust: &Robust) {
+    /// Records number, residual and conditioning of the matches of `scene`.
+    fn record(&mut self, matches: &Matches, robust: &Robust, scene: &[PlacedSurfel]) {
         self.matches = matches.all.iter().filter(|one| matches!(one.with, Counterpart::Live(_))).count();
         self.view_matches = matches.all.len() - self.matches;
-        let (mut weights, mut squares, mut information) = (0.0, 0.0, Matrix::zeros());
+        let (mut weights, mut squares) = (0.0, 0.0);
         for plane in matches.planes() {
             let weight = robust.weight(plane, plane.distance_m);
             weights += weight;
             squares += weight * plane.distance_m * plane.distance_m;
-            information += plane.normal * plane.normal.transpose() * weight;
         }
         self.residual_rms_m = if weights > 0.0 { (squares / weights).sqrt() } else { 0.0 };
-        self.conditioning = 0.0;
-        if weights > 0.0 {
-            let eigen = information.symmetric_eigen();
-            let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-            // In a smooth tunnel normals tilt along the axis only by error; the sum of the errors would count as
-            // information.
-            let along =
-                |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|tilt| tilt.abs() > MIN_SIGNIFICANT_TILT);
-            let information_of =
-                |plane: &Plane| along(plane).map(|tilt| robust.weight(plane, plane.distance_m) * tilt * tilt);
-            let least = matches.planes().filter_map(information_of).fold(0.0, |sum, term| sum + term);
-            (self.conditioning, self.weakest) = (least / eigen.eigenvalues.max(), weakest);
-        }
+        (self.conditioning, self.weakest) = conditioning(matches.planes(), robust);
+        // Fine surfels add to the strong directions too. They must not make a direction that the usual ones constrain weak.
+        let is_usual = |one: &&Match| scene[one.a as usize].patch.level != FINE;
+        let (usual, _) = conditioning(matches.all.iter().filter(is_usual).map(|one| &one.plane), robust);
+        self.conditioning = self.conditioning.max(usual);
     }
+}
+
+/// Smallest over largest eigenvalue of the position information of `planes`, and the least constrained direction.
+fn conditioning<'a>(planes: impl Iterator<Item = &'a Plane> + Clone, robust: &Robust) -> (f64, Vector) {
+    let weight = |plane: &Plane| robust.weight(plane, plane.distance_m);
+    let outer = |plane: &Plane| plane.normal * plane.normal.transpose() * weight(plane);
+    let information = planes.clone().map(outer).fold(Matrix::zeros(), |sum, term| sum + term);
+    let eigen = information.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    if largest <= 0.0 {
+        return (0.0, Vector::zeros());
+    }
+    let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    // In a smooth tunnel normals tilt along the axis only by error; the sum of the errors would count as information.
+    let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|tilt| tilt.abs() > MIN_SIGNIFICANT_TILT);
+    let least = planes.filter_map(|plane| along(plane).map(|tilt| weight(plane) * tilt * tilt));
+    (least.fold(0.0, |sum, term| sum + term) / largest, weakest)
 }
