@@ -66,7 +66,7 @@ fn full_run(case: &Case) -> (i32, String, String, Option<String>) {
     let Case { scene, lidar, duration_s, seed, .. } = case;
     let command = format!(
         "--scene {scene} --lidar {lidar} --motion {motion} --duration {duration_s}s --seed {seed} --faults faults.ron \
-         --open-loop --threads 1 --quiet --json --out run"
+         --threads 1 --quiet --json --out run"
     );
     let (code, figures, stderr) = run(here.path(), &command);
     (code, figures, stderr, std::fs::read_to_string(here.path().join("run/open_loop.tum")).ok())
@@ -78,12 +78,14 @@ fn stated(metrics: &Value) -> Vec<&str> {
     events.iter().flat_map(|list| list.as_array().unwrap()).map(|event| event["kind"].as_str().unwrap()).collect()
 }
 
-/// Position and rotation errors, m and degrees: RMSE. For a straight line, whose rotation about itself cannot be
-/// aligned, the largest position error.
+/// Position and rotation errors, m and degrees: RMSE, of the open and the closed loop the larger. For a straight line, whose
+/// rotation about itself cannot be aligned, the largest position error.
 fn errors(metrics: &Value) -> (f64, f64) {
-    let open = &metrics["open_loop"];
-    match (open["position_rmse_m"].as_f64(), open["rotation_rmse_deg"].as_f64()) {
-        (Some(position_m), Some(rotation_deg)) => (position_m, rotation_deg),
+    let of = |key| ["open_loop", "closed_loop"].map(|run| metrics[run][key].as_f64());
+    match (of("position_rmse_m"), of("rotation_rmse_deg")) {
+        ([Some(open_m), Some(closed_m)], [Some(open_deg), Some(closed_deg)]) => {
+            (open_m.max(closed_m), open_deg.max(closed_deg))
+        }
         _ => (metrics["integrity"]["largest_error_m"].as_f64().unwrap(), 0.0),
     }
 }

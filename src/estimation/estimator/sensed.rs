@@ -37,14 +37,13 @@ impl SensedMotion {
     ) {
         let from_s = self.until_s.unwrap_or(f64::NEG_INFINITY).max(window.start_s());
         let until_s = final_s + MIDDLE * (window.nominal.end_s() - final_s);
+        if until_s > from_s {
+            let motion = window.motion_without_views(from_s, until_s, at);
+            self.pending.extend(motion.map(|motion| PendingMotion { from_s, until_s, motion, start: None }));
+            self.until_s = Some(until_s);
+        }
+        // The first motion begins with the window, whose states from there on are still known.
         self.settle(window, final_s, observed);
-        if until_s <= from_s {
-            return;
-        }
-        if let Some(motion) = window.motion_without_views(from_s, until_s, at) {
-            self.pending.push_back(PendingMotion { from_s, until_s, motion, start: None });
-        }
-        self.until_s = Some(until_s);
     }
 
     /// Moves motion before `final_s` to `observed`.
