@@ -12,7 +12,7 @@ use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
 use zsim::study::replace_text;
 use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
-use zsim::study::spring::{Shake, SpringReport, mode_figure, page, spring_report};
+use zsim::study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one
@@ -52,6 +52,24 @@ pub(super) struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Design(Design),
+    Export(Export),
+}
+
+/// Write a head and its spring as a robot model: URDF (RViz, Foxglove), SDF (Gazebo) and MJCF (MuJoCo)
+///
+/// The spring becomes six elastic joints with the modes of the head at rest; URDF has their stiffness as comments. The frames are
+/// those of recordings: base, head, laser, imu_link.
+#[derive(Args)]
+#[command(after_help = "Example:\n  zsim spring export handheld --out results/robot")]
+struct Export {
+    /// A head or a spring: a name under specs/heads/ or specs/springs/, or a file
+    #[arg(value_name = "FILE")]
+    file: String,
+    /// The head on a spring that is given without one
+    #[arg(long, value_name = "NAME|FILE", default_value = "handheld")]
+    head: String,
+    #[command(flatten)]
+    out: OutArguments,
 }
 
 /// Search for a spring that meets targets: the Pareto set as table, CSV and plot, verified by simulation
@@ -68,9 +86,25 @@ struct Design {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     match (&arguments.search, &arguments.file) {
         (Some(Command::Design(design)), _) => search(design, global),
+        (Some(Command::Export(wanted)), _) => export(wanted, global),
         (None, Some(file)) => print_report(file, arguments, global),
         (None, None) => Err(super::usage::Usage("name a head or a spring".to_owned()).into()),
     }
+}
+
+/// Writes `head.urdf`, `head.sdf` and `head.xml`.
+fn export(wanted: &Export, global: &Global) -> anyhow::Result<Completion> {
+    let Subject { name, spec, source } = head_of(&wanted.file, &wanted.head)?;
+    let exported = HeadExport::new(&spec, &HeadModel::new(&spec, &source)?)?;
+    let out = wanted.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/robot-{name}")));
+    let folder = output::folder(&out, wanted.out.force)?;
+    let files = [("head.urdf", exported.urdf()), ("head.sdf", exported.sdf()), ("head.xml", exported.mjcf())];
+    for (file, text) in &files {
+        replace_text(&folder.join(file), text)?;
+    }
+    let names = files.map(|(file, _)| file);
+    output::print_result(global, &names.join("\n"), serde_json::json!({ "files": names }), Some(&folder))?;
+    Ok(Completion::Done)
 }
 
 fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {

@@ -39,7 +39,7 @@ impl Body {
     /// The mass matrix for the twist (velocity of the centre of mass, angular velocity).
     ///
     /// `rotation` takes the axes of the head to those in which the twist is expressed.
-    pub(super) fn mass_matrix(&self, rotation: &Matrix) -> Matrix6 {
+    pub fn mass_matrix(&self, rotation: &Matrix) -> Matrix6 {
         let inertia = rotation * self.inertia_in_head * rotation.transpose();
         blocks(&(Matrix::identity() * self.mass_kg), &Matrix::zeros(), &Matrix::zeros(), &inertia)
     }

@@ -15,4 +15,5 @@ mod skip;
 mod slam_bound;
 mod slurm;
 mod spring_design;
+mod spring_export;
 mod sweep;

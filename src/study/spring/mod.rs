@@ -2,6 +2,7 @@
 
 mod capacity;
 pub mod design;
+mod export;
 mod fatigue;
 mod margins;
 mod metrics;
@@ -16,6 +17,7 @@ mod tables;
 mod view_plane;
 mod wire;
 
+pub use export::{ExportError, HeadExport};
 pub use fatigue::StressCycle;
 pub use margins::SpringMargins;
 pub use metrics::{DesignMetrics, closed_form, simulated};
