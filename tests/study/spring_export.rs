@@ -28,7 +28,7 @@ fn difference_in_mujoco(head: &str) -> Option<f64> {
 
 #[test]
 fn heads_have_the_same_modes_in_mujoco() {
-    // Measured: below 1e-5; the mass of the wire, which these heads neglect, is only approximate.
+    // Measured: below 1e-5.
     for head in ["handheld", "elastic_cables", "rope_pendulum"] {
         let Some(difference) = difference_in_mujoco(head) else { return };
         println!("{head}: {difference}");
@@ -55,9 +55,12 @@ fn sdf_has_the_springs_and_urdf_the_frames_of_recordings() {
 #[test]
 fn a_head_without_elastic_joints_is_refused_with_the_reason() {
     let here = tempfile::tempdir().unwrap();
-    for (head, reason) in
-        [("rigid", "there is no spring"), ("universal_joint", "two rotations"), ("nodding", "a motor")]
-    {
+    for (head, reason) in [
+        ("rigid", "there is no spring"),
+        ("universal_joint", "two rotations"),
+        ("nodding", "a motor"),
+        ("backpack", "the mass of the wire"),
+    ] {
         let (code, _, errors) = run(here.path(), &format!("spring export {head} --out robot"));
         assert_eq!(code, 1, "{head}");
         assert!(errors.contains(reason), "{head}: {errors}");

@@ -38,13 +38,13 @@ impl HeadExport {
 
     /// A joint of the head, in its frame at rest.
     fn joint(&self, joint: &ElasticJoint) -> String {
-        let ElasticJoint { name, turns, axis, point, stiffness, damping, reference, added } = joint;
+        let ElasticJoint { name, turns, axis, point, stiffness, damping, reference } = joint;
         let kind = if *turns { "hinge" } else { "slide" };
         let axis = self.base_from_head.rotation.inverse() * axis;
         let point = self.base_from_head.inverse() * nalgebra::Point3::from(*point);
         format!(
             "        <joint name=\"{name}\" type=\"{kind}\" axis=\"{}\" pos=\"{}\" stiffness=\"{stiffness:?}\" \
-             damping=\"{damping:?}\" springref=\"{reference:?}\" armature=\"{added:?}\"/>\n",
+             damping=\"{damping:?}\" springref=\"{reference:?}\"/>\n",
             list(axis.as_slice()),
             list(point.coords.as_slice())
         )

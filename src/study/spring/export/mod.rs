@@ -1,8 +1,7 @@
 //! A head on its spring as a robot model of other simulators: URDF, SDF and MJCF.
 //!
 //! The spring becomes three sliding and three turning joints between base and head, each with a stiffness and a damping, through
-//! the point where a sideways force does not turn the head. It has the linear modes of the head at rest. MJCF also has the mass of
-//! the wire, as armature of the joints.
+//! the point where a sideways force does not turn the head. It has the linear modes of the head at rest.
 
 mod mjcf;
 mod sdf;
@@ -14,6 +13,8 @@ use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 
 /// Greatest coupling between joints that may be neglected: the entry of the stiffness over the geometric mean of its diagonals.
 const MAX_COUPLING: f64 = 0.05;
+/// Mass of wire or fluid that may be neglected, of that of the head.
+const MAX_ADDED: f64 = 0.001;
 /// Mass of the links between the joints, kg: simulators want one.
 const LINK_MASS_KG: f64 = 1e-6;
 /// Moment of inertia of these links, kg m^2.
@@ -25,6 +26,12 @@ pub enum ExportError {
     /// The linkage is not elastic in six directions.
     #[error("only a head on springs has a model with six elastic joints: {0}")]
     NotElastic(&'static str),
+    /// Wire or fluid moves with the head.
+    #[error(
+        "the mass of the wire or of a fluid moves with this head, which the links of a robot model cannot show: give the springs \
+         `spring_mass: neglected`"
+    )]
+    AddedMass,
     /// The joints of the model would not move independently.
     #[error(
         "the stiffness couples {first} with {second} by {coupling:.2} of their own, which independent joints cannot show; up to {} \
@@ -70,8 +77,6 @@ struct ElasticJoint {
     damping: f64,
     /// Coordinate without force; 0 is the rest.
     reference: f64,
-    /// Mass or moment of inertia that moves with the joint in addition to the head: wire and fluid.
-    added: f64,
 }
 
 impl HeadExport {
@@ -88,8 +93,10 @@ impl HeadExport {
         let (body, base_from_head) = (*head.body(), *head.base_from_head_at_rest());
         let centre = base_from_head * nalgebra::Point3::from(body.centre_of_mass_in_head);
         let about_centre = body.mass_matrix(base_from_head.rotation.to_rotation_matrix().matrix());
-        let added = linear.mass - about_centre;
-        let joints = joints(&centre.coords, linear, &added, body.mass_kg);
+        if (linear.mass - about_centre).amax() > MAX_ADDED * body.mass_kg {
+            return Err(ExportError::AddedMass);
+        }
+        let joints = joints(&centre.coords, linear, body.mass_kg);
         check_coupling(&joints, &centre.coords, &linear.stiffness, body.mass_kg)?;
         let block = |part: &PartSpec| match part {
             PartSpec::Block { size_m, centre_m, .. } => Some((*size_m, *centre_m)),
@@ -110,8 +117,8 @@ impl HeadExport {
 /// The joints: along x, y and z of the base, then about y, x and z.
 ///
 /// About the centre of mass, with the displacement `d` and the rotation `phi`, a joint about y at `h` below it has the energy
-/// `kx (dx - h phi)^2 / 2 + (k - m g h) phi^2 / 2`: the weight `m g` stands on the joint. So `h = -K_x,phi / K_xx`.
-fn joints(centre: &Vector, linear: &LinearModel, added: &Matrix6, mass_kg: f64) -> [ElasticJoint; 6] {
+/// `kx (dx - h phi)^2 / 2 + (k - m g h) phi^2 / 2`: the joint bears the weight `m g`. So `h = -K_x,phi / K_xx`.
+fn joints(centre: &Vector, linear: &LinearModel, mass_kg: f64) -> [ElasticJoint; 6] {
     let LinearModel { stiffness, damping, .. } = linear;
     let weight_n = mass_kg * STANDARD_GRAVITY_M_PER_S2;
     let slide = |name, axis: usize, reference: f64| ElasticJoint {
@@ -122,27 +129,22 @@ fn joints(centre: &Vector, linear: &LinearModel, added: &Matrix6, mass_kg: f64) 
         stiffness: stiffness[(axis, axis)],
         damping: damping[(axis, axis)],
         reference,
-        added: added[(axis, axis)],
     };
     // A rotation about y moves the centre of mass along +x, one about x along -y.
     let turn = |name, axis: usize, along: usize, sign: f64| {
         let (row, shift) = (3 + axis, stiffness[(along, along)]);
         let below = -sign * stiffness[(along, row)] / shift;
         let elastic = stiffness[(row, row)] - shift * below * below + weight_n * below;
-        let about_joint = |matrix: &Matrix6| {
-            let lever = sign * below;
-            let all = matrix[(row, row)] + 2.0 * lever * matrix[(along, row)] + lever * lever * matrix[(along, along)];
-            all.max(0.0)
-        };
+        let lever = sign * below;
+        let lossy = damping[(row, row)] + 2.0 * lever * damping[(along, row)] + lever * lever * damping[(along, along)];
         ElasticJoint {
             name,
             turns: true,
             axis: Vector::ith(axis, 1.0),
             point: centre - Vector::z() * below,
             stiffness: elastic,
-            damping: about_joint(damping),
+            damping: lossy.max(0.0),
             reference: 0.0,
-            added: about_joint(added),
         }
     };
     let yaw = ElasticJoint {
@@ -150,7 +152,6 @@ fn joints(centre: &Vector, linear: &LinearModel, added: &Matrix6, mass_kg: f64) 
         turns: true,
         stiffness: stiffness[(5, 5)],
         damping: damping[(5, 5)],
-        added: added[(5, 5)],
         ..slide("", 2, 0.0)
     };
     [

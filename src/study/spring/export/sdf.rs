@@ -5,7 +5,7 @@ use crate::geometry::{Matrix, Pose, Vector};
 use std::fmt::Write as _;
 
 impl HeadExport {
-    /// SDF 1.9: a model whose link `base` stands in its origin.
+    /// SDF 1.9: a model with the frame `base` as its origin.
     pub fn sdf(&self) -> String {
         let mut text = String::from("<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n  <model name=\"zsim_head\">\n");
         text += "    <link name=\"base\">\n";
