@@ -1,5 +1,6 @@
 //! One element of a spring: a quadratic potential in the deformation coordinates.
 
+use super::coil_stop::CoilStop;
 use super::deformation::{blocks, split, stack};
 use super::{Column, Deformation, ElasticityError, Matrix6, SectionLoad, Vector6, conditioning, loaded_stiffness};
 use crate::geometry::{Matrix, Pose, Vector, skew};
@@ -9,12 +10,13 @@ use crate::geometry::{Matrix, Pose, Vector, skew};
 /// The potential is `U = f . e + e . K e / 2` in `e`, the [`Deformation`] coordinates minus those of the straight
 /// segment, with the axial load `f`. The geometric stiffness (load times curvature of the coordinates) is subtracted in
 /// `K`, such that the stiffness of the top about the straight, loaded state is exactly the given one. The force law
-/// therefore includes the softening by the load, but not gravity.
+/// therefore includes the softening by the load, but not gravity. Where coils touch, the potential of their contact is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Element {
     rest: Vector6,
     load: Vector6,
     stiffness: Matrix6,
+    stop: Option<CoilStop>,
 }
 
 impl Element {
@@ -43,6 +45,7 @@ impl Element {
             rest: Vector6::new(0.0, 0.0, length_m, 0.0, 0.0, 0.0),
             load: Vector6::new(0.0, 0.0, -load_n, 0.0, 0.0, 0.0),
             stiffness: (stiffness + stiffness.transpose()) * 0.5,
+            stop: None,
         })
     }
 
@@ -52,6 +55,11 @@ impl Element {
     /// When the load buckles the segment.
     pub fn of_column(column: &Column) -> Result<Self, ElasticityError> {
         Self::new(column.length_m, column.load_n, &loaded_stiffness(column)?)
+    }
+
+    /// The same segment with contact of its coils.
+    pub(super) fn with_stop(self, stop: CoilStop) -> Self {
+        Self { stop: Some(stop), ..self }
     }
 
     /// The coordinates of the straight, loaded segment.
@@ -66,13 +74,20 @@ impl Element {
 
     /// The gradient of the potential by the coordinates, N and N m.
     pub fn gradient(&self, coordinates: &Vector6) -> Vector6 {
+        let in_contact = self.stop.map_or_else(Vector6::zeros, |stop| stop.gradient(&(coordinates - self.rest)));
+        self.gradient_of_wire(coordinates) + in_contact
+    }
+
+    /// The gradient without that of the contact.
+    fn gradient_of_wire(&self, coordinates: &Vector6) -> Vector6 {
         self.load + self.stiffness * (coordinates - self.rest)
     }
 
     /// The potential, zero for the straight, loaded segment, J.
     pub fn potential_j(&self, coordinates: &Vector6) -> f64 {
         let e = coordinates - self.rest;
-        e.dot(&(self.load + self.stiffness * e * 0.5))
+        let in_contact = self.stop.map_or(0.0, |stop| stop.potential_j(&e));
+        e.dot(&(self.load + self.stiffness * e * 0.5)) + in_contact
     }
 
     /// The wrench on the top, about the top, in the axes of the base.
@@ -81,9 +96,10 @@ impl Element {
         -deformation.wrench(&self.gradient(&deformation.coordinates))
     }
 
-    /// The loads on the sections at the base and at the top.
+    /// The loads on the wire at the sections at the base and at the top, without the forces between coils that touch.
     pub fn section_loads(&self, base_from_top: &Pose) -> [SectionLoad; 2] {
-        let on_top = self.wrench(base_from_top);
+        let deformation = Deformation::of(base_from_top);
+        let on_top = -deformation.wrench(&self.gradient_of_wire(&deformation.coordinates));
         let through_base = -Self::reaction(base_from_top, &on_top);
         [SectionLoad::of_wrench(&through_base), SectionLoad::in_base(base_from_top, &on_top)]
     }

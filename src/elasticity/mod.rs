@@ -8,11 +8,13 @@
 //! - [`loaded_stiffness`]: the effect of an axial load on the stiffness of such a column (Haringx).
 //! - [`Deformation`]: the displacement of the top in corotational coordinates.
 //! - [`Spring`]: the force law for large rotations: one or several elements, each with a potential in those
-//!   coordinates, so that energy is conserved exactly; the nodes between elements are massless and in equilibrium.
+//!   coordinates, so that energy is conserved exactly; the nodes between elements are massless and in equilibrium. Coils that
+//!   touch stop each other elastically.
 
 mod buckling;
 mod chain;
 mod coil;
+mod coil_stop;
 mod deformation;
 mod element;
 mod error;

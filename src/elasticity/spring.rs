@@ -1,8 +1,9 @@
 //! The force law of a spring of one or several elements.
 
 use super::chain::Chain;
+use super::coil_stop::CoilStop;
 use super::deformation::Deformation;
-use super::{Column, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
+use super::{Coil, Column, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
 use crate::geometry::Pose;
 
 /// Maximum number of segments of a spring.
@@ -41,6 +42,12 @@ impl Spring {
         let element = Element::of_column(&column.segment(segments))
             .map_err(|error| too_few_segments(column, segments).unwrap_or(error))?;
         Ok(Self { element, segments, length_m: column.length_m })
+    }
+
+    /// The same spring, whose coils stop each other where they touch; it was created from `coil` under `load_n`.
+    pub fn with_contact(self, coil: &Coil, load_n: f64) -> Self {
+        let stop = CoilStop::new(coil, load_n, self.segments, self.element.stiffness().m33);
+        Self { element: self.element.with_stop(stop), ..self }
     }
 
     /// Creates a single element of length `length_m` under `load_n` with the stiffness `at_top` when straight.

@@ -1,6 +1,6 @@
 //! Contact of the coils of a spring in a simulation.
 
-use super::heads::ReferenceHead;
+use super::heads::{BasePulse, ReferenceHead};
 use std::f64::consts::TAU;
 use zsim::dynamics::{CoilContact, ContactWatch, HeadModel, HeadSimulation, LinkageSpec};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector};
@@ -77,6 +77,35 @@ fn a_pressed_spring_touches_at_its_solid_length_and_a_pulled_one_never() {
     let touched = moved(-open_m - 0.0012).expect("beyond the solid length");
     // 1.2 mm too far are 0.1 mm for each of the 12 gaps.
     assert!((touched.least_gap_mm + 0.1).abs() < 2e-3, "{touched:?}");
+}
+
+/// A base that rises and sinks by 20 mm makes the coils clash; a spring without contact would be shorter than its wire.
+#[test]
+fn closed_coils_return_the_energy_of_the_head() {
+    for segments in [1, 4] {
+        let model = ReferenceHead { coil: [25.0, 3.0, 12.0, 46.0], segments, ..ReferenceHead::default() }.model();
+        let pulse = BasePulse { axis: 2, amount: 0.02, period_s: 0.08 };
+        let mut watch = ContactWatch::new(&model);
+        let (mut energies, mut at_rest) = (Vec::new(), None);
+        for state in HeadSimulation::new(&model, &pulse, 2.5e-4).unwrap().take(40_000) {
+            let state = state.unwrap();
+            watch.check(state.t_s, &state.base, &state.head);
+            let energy = model.energy_j(&state.base.world_from_body, &state.head).unwrap();
+            let at_rest = *at_rest.get_or_insert(energy);
+            if state.t_s > pulse.period_s {
+                energies.push(energy - at_rest);
+            }
+        }
+        let touched = watch.contact().expect("the coils touch");
+        // In contact the spring has 25 times the stiffness: nine tenths of the energy shorten the closed coils by less than
+        // sqrt(2 E / (25 * 4282 N/m)).
+        let overlap_m = (2.0 * energies[0] / (24.0 * 4282.0)).sqrt();
+        assert!(-touched.least_gap_mm * 12.0 < 1e3 * overlap_m, "{touched:?} {overlap_m}");
+        let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+        let tenth = energies.len() / 10;
+        let (first, last) = (mean(&energies[..tenth]), mean(&energies[energies.len() - tenth..]));
+        assert!((last / first - 1.0).abs() < 3e-3, "{segments} segments: {first} J, then {last} J");
+    }
 }
 
 #[test]
