@@ -1,7 +1,8 @@
 //! `--live`: the page of a run while it runs.
 
 use crate::command::run;
-use crate::live_run::{HOSTILE, LiveRun, hostile_scene};
+use crate::hostile_scene::{HOSTILE, hostile_scene};
+use crate::live_run::LiveRun;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -11,8 +11,9 @@ mod documents;
 mod examples;
 mod gains;
 mod hostile;
+#[path = "../hostile_scene/mod.rs"]
+mod hostile_scene;
 mod live;
-#[path = "../live_run/mod.rs"]
 mod live_run;
 mod maps;
 mod scene;

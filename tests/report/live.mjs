@@ -1,14 +1,19 @@
-// Loads the page of a run that is not complete in two headless browser pages: node live.mjs NODE_MODULES ADDRESS [PICTURES]
+// Starts a run and loads its page in two headless browser pages: node live.mjs NODE_MODULES ZSIM ARGUMENTS...
 //
+// The browser is started before the run, which takes some seconds only.
 // Exits with 77 if a program or a module that it needs is not installed.
-// Fails if the number of points does not grow, the head does not move, there is an error in the console, a request to
-// another address, or an accessibility violation, or if the final verdict or the report is missing. With PICTURES, it
-// writes screenshots to that folder.
+// Fails if the run fails, the number of points does not grow, the head does not move, there is an error in the console, a request
+// to another address, or an accessibility violation, or if the final verdict or the report is missing. With the environment
+// variable PICTURES, it writes screenshots to that folder.
+import { spawn } from "node:child_process";
 import { join } from "node:path";
+import { createInterface } from "node:readline";
 import { audit, check, finish, launch } from "./chromium.mjs";
 
-const [modules, address, pictures] = process.argv.slice(2);
+const [modules, zsim, ...options] = process.argv.slice(2);
+const pictures = process.env.PICTURES;
 const { browser, axe } = await launch(modules);
+let address;
 
 // In the page: keeps each number of points and each time that it shows, and whether the run goes on.
 function recordGrowth() {
@@ -21,7 +26,7 @@ function recordGrowth() {
   });
 }
 
-async function open(colorScheme, width) {
+async function prepare(colorScheme, width) {
   const page = await browser.newPage({ colorScheme, viewport: { width, height: 900 } });
   page.setDefaultTimeout(120_000);
   const name = `${colorScheme}, ${width} px`;
@@ -30,9 +35,23 @@ async function open(colorScheme, width) {
   const isAllowed = (url) => url.startsWith(address) || /^(data|blob):/.test(url);
   await page.addInitScript(recordGrowth);
   page.on("request", (request) => check(isAllowed(request.url()), `${name}: request to ${request.url()}`));
+  return { page, name };
+}
+
+async function open({ page }) {
   await page.goto(address);
   await page.waitForFunction(() => document.documentElement.dataset.drawn);
-  return { page, name };
+}
+
+// Starts zsim and sets the address of its page; returns its exit code as a promise in an object, which `await` leaves alone.
+async function start() {
+  const run = spawn(zsim, options, { stdio: ["ignore", "ignore", "pipe"] });
+  const exit = new Promise((resolve) => run.on("exit", resolve));
+  address = await new Promise((resolve, reject) => {
+    createInterface({ input: run.stderr }).on("line", (line) => line.startsWith("live: ") && resolve(line.slice("live: ".length)));
+    exit.then((code) => reject(new Error(`the run ended with ${code} before its page was there`)));
+  });
+  return { exit };
 }
 
 const shoot = async (page, name) => {
@@ -68,9 +87,13 @@ async function openReport({ page, name }) {
 }
 
 const sizes = pictures ? [["light", 1400], ["dark", 1400], ["light", 400], ["dark", 400]] : [["light", 1400], ["dark", 400]];
-const opened = await Promise.all(sizes.map((size) => open(...size)));
-await Promise.all(opened.map(seeGrowth));
-await Promise.all(opened.map(seeEnd));
-await openReport(opened[0]);
+const pages = await Promise.all(sizes.map((size) => prepare(...size)));
+const { exit } = await start();
+await Promise.all(pages.map(open));
+await Promise.all(pages.map(seeGrowth));
+await Promise.all(pages.map(seeEnd));
+await openReport(pages[0]);
+const code = await exit;
+check(code === 0 || code === 3, `the run ended with ${code}`);
 await browser.close();
 finish();

@@ -4,9 +4,9 @@
 
 #[path = "../command/mod.rs"]
 mod command;
+#[path = "../hostile_scene/mod.rs"]
+mod hostile_scene;
 mod live;
-#[path = "../live_run/mod.rs"]
-mod live_run;
 mod page;
 #[path = "../skip/mod.rs"]
 mod skip;

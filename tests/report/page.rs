@@ -1,7 +1,7 @@
 //! The pages of zsim in a headless browser.
 
 use crate::command::run;
-use crate::live_run::hostile_scene;
+use crate::hostile_scene::hostile_scene;
 use crate::skip::run_or_skip;
 use std::path::Path;
 use std::process::Command;

@@ -2,11 +2,8 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
-
-/// Runs as a script if the page does not escape it.
-pub const HOSTILE: &str = "<script>window.hostile=1</script>";
 
 /// A run with `--live`.
 pub struct LiveRun {
@@ -31,12 +28,4 @@ impl LiveRun {
     pub fn exit_code(mut self) -> i32 {
         self.child.wait().unwrap().code().unwrap()
     }
-}
-
-/// A scene with a hostile name in `folder`.
-pub fn hostile_scene(folder: &Path) -> PathBuf {
-    let office = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/office.ron")).unwrap();
-    let scene = folder.join("hostile.ron");
-    std::fs::write(&scene, office.replacen("name: \"office\"", &format!("name: \"{HOSTILE}\""), 1)).unwrap();
-    scene
 }
