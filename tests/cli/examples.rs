@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The examples, and the files that each must write.
-const EXAMPLES: [(&str, &[&str]); 5] = [
+const EXAMPLES: [(&str, &[&str]); 6] = [
     ("ci", &["recording.mcap", "recording.tum", "estimate.tum", "comparison/comparison.json"]),
     ("own_recording", &["estimate/metrics.json", "estimate/cloud.ply", "estimate/report.html"]),
     ("own_scene", &["workshop.svg", "workshop/metrics.json", "workshop/report.html"]),
     ("spring_design", &["springs/pareto.csv", "springs/pareto.svg"]),
     ("sweep", &["sweep/slurm/array.sh", "sweep/table.parquet", "sweep/study.md"]),
+    ("viewers", &["recording.mcap", "estimate/result.mcap", "head/head.urdf"]),
 ];
 
 fn folder() -> PathBuf {
@@ -74,4 +75,47 @@ fn the_example_of_ci_fails_above_its_limit_and_without_part_of_the_trajectory() 
     assert!(code == Some(1) && text.contains("estimate.tum: position_rmse_m is"), "{code:?} {text}");
     let (code, text) = run("4000", "0.001");
     assert!(code == Some(1) && text.contains("estimate.tum: covers 50.0 % of the truth"), "{code:?} {text}");
+}
+
+/// The topics of a Foxglove layout: those of its 3-D panels, and the first part of the paths of its plots.
+fn topics_of_layout(layout: &serde_json::Value) -> Vec<String> {
+    let panels = layout["configById"].as_object().unwrap();
+    let of_views =
+        panels.values().filter_map(|panel| panel["topics"].as_object()).flat_map(|topics| topics.keys().cloned());
+    let paths = panels.values().filter_map(|panel| panel["paths"].as_array()).flatten();
+    let of_plots = paths.map(|path| path["value"].as_str().unwrap().split('.').next().unwrap().to_owned());
+    of_views.chain(of_plots).collect()
+}
+
+/// The identifiers of the panels in the tree of a layout.
+fn panels_of(tree: &serde_json::Value) -> Vec<String> {
+    match tree.as_str() {
+        Some(panel) => vec![panel.to_owned()],
+        None => ["first", "second"].iter().flat_map(|side| panels_of(&tree[side])).collect(),
+    }
+}
+
+#[test]
+fn layouts_for_viewers_show_topics_of_their_files() {
+    let here = tempfile::tempdir().unwrap();
+    assert!(script("viewers", here.path()).status().unwrap().success());
+    for (layout, file) in [("recording", "recording.mcap"), ("result", "estimate/result.mcap")] {
+        let text = std::fs::read_to_string(folder().join(format!("viewers/{layout}.foxglove.json"))).unwrap();
+        let layout: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let bytes = std::fs::read(here.path().join(file)).unwrap();
+        let summary = mcap::Summary::read(&bytes).unwrap().expect("a summary");
+        let topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+        let shown = topics_of_layout(&layout);
+        assert!(shown.len() > 5, "{shown:?}");
+        for topic in shown {
+            assert!(topics.contains(&topic.as_str()), "{file} has no {topic}: {topics:?}");
+        }
+        let mut panels = panels_of(&layout["layout"]);
+        panels.sort();
+        let defined: Vec<&String> = layout["configById"].as_object().unwrap().keys().collect();
+        assert!(
+            panels.iter().eq(defined.iter().copied().collect::<std::collections::BTreeSet<_>>()),
+            "{panels:?} {defined:?}"
+        );
+    }
 }
