@@ -97,8 +97,7 @@ fn closed_coils_return_the_energy_of_the_head() {
             }
         }
         let touched = watch.contact().expect("the coils touch");
-        // In contact the spring has 25 times the stiffness: nine tenths of the energy shorten the closed coils by less than
-        // sqrt(2 E / (25 * 4282 N/m)).
+        // The energy in the contact, 24 times as stiff as the spring of 4282 N/m, is at most that of the head.
         let overlap_m = (2.0 * energies[0] / (24.0 * 4282.0)).sqrt();
         assert!(-touched.least_gap_mm * 12.0 < 1e3 * overlap_m, "{touched:?} {overlap_m}");
         let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;

@@ -145,6 +145,7 @@ impl Tree {
     /// A message if no setting or several settings match.
     pub fn locate(&self, path: &str) -> Result<Vec<String>, String> {
         let keys: Vec<&str> = path.split('.').collect();
+        // `split` yields at least one part.
         if !self.is_named(keys[0]) {
             let named: Vec<&str> = self.named_keys().collect();
             return settings::find(&Value::Object(self.unnamed()), &keys)
