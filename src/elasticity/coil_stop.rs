@@ -16,7 +16,8 @@ use std::f64::consts::PI;
 /// Stiffness of the contact relative to the axial stiffness of the open spring.
 ///
 /// Contact of steel is stiffer by far. A mass of 0.5 kg that meets the closed coils at 0.5 m/s on a spring of 500 N/m shortens
-/// them by 3 mm in all, and the fastest motion is five times that of the open spring, which a step of 1 ms follows.
+/// them by 3 mm in all. The bounce is five times as fast as that of the open spring: with steps of 1 ms the energy changes by 4 % in
+/// 10 s of clashes at a bounce of 16 Hz, and by 70 % at 33 Hz.
 const STIFFNESS_RATIO: f64 = 24.0;
 
 /// The contact of the coils of an element.
