@@ -1,8 +1,8 @@
 //! `--live`: the page of a run while it runs.
 
+use crate::cli::live_run::LiveRun;
 use crate::command::run;
 use crate::hostile_scene::{HOSTILE, hostile_scene};
-use crate::live_run::LiveRun;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -1,4 +1,4 @@
-use crate::heads::{FixedBase, Nodding, built, shipped, states};
+use crate::dynamics::heads::{FixedBase, Nodding, built, shipped, states};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use zsim::dynamics::{HeadModel, HeadState};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector};

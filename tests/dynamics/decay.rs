@@ -1,4 +1,4 @@
-use crate::heads::{
+use crate::dynamics::heads::{
     BasePulse, ReferenceHead, built, displacement, jointed, shipped, states, suspended, upright_spring,
 };
 use approx::assert_relative_eq;

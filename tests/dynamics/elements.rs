@@ -1,6 +1,6 @@
 //! Linkages of several elements compared with closed forms.
 
-use crate::heads::{built, cord, floating, jointed, moored, states, suspended, upright_spring};
+use crate::dynamics::heads::{built, cord, floating, jointed, moored, states, suspended, upright_spring};
 use approx::assert_relative_eq;
 use nalgebra::Matrix2;
 use std::f64::consts::{PI, TAU};
@@ -83,7 +83,7 @@ fn parallel_springs_add_up_and_have_rotational_stiffness_from_their_levers() {
 
 #[test]
 fn a_suspension_of_one_spring_equals_the_single_spring() {
-    let table = crate::heads::ReferenceHead { coil: [20.0, 2.5, 8.0, 80.0], ..Default::default() };
+    let table = crate::dynamics::heads::ReferenceHead { coil: [20.0, 2.5, 8.0, 80.0], ..Default::default() };
     // The reference head has its centre 70 mm above the spring, and the same inertias.
     let alone = table.model();
     let one = model([0.0, 0.0, 0.15], &upright_spring([0.0; 3], [0.0, 0.0, -0.07]));
@@ -223,7 +223,7 @@ fn a_universal_joint_has_two_rocking_modes_with_the_stiffness_of_spring_less_gra
 fn the_axes_of_a_joint_stay_coincident_for_any_base_motion() {
     let model = model([0.0, 0.0, 0.07], &jointed(0.7));
     let mut lean = 0.0_f64;
-    for state in states(&model, &crate::heads::Nodding { amount_rad: 0.1 }, 1e-3, 5.0) {
+    for state in states(&model, &crate::dynamics::heads::Nodding { amount_rad: 0.1 }, 1e-3, 5.0) {
         let seen = state.base.world_from_body.inv_mul(&state.head.world_from_body);
         let pivot = seen * nalgebra::Point3::new(0.0, 0.0, -0.07);
         let (x, y) = (Vector::x(), seen.rotation * Vector::y());

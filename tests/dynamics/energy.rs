@@ -1,4 +1,6 @@
-use crate::heads::{BasePulse, Nodding, ReferenceHead, built, cord, floating, jointed, moored, states, suspended};
+use crate::dynamics::heads::{
+    BasePulse, Nodding, ReferenceHead, built, cord, floating, jointed, moored, states, suspended,
+};
 use approx::assert_relative_eq;
 use zsim::dynamics::{HeadModel, HeadSimulation};
 use zsim::geometry::Vector;

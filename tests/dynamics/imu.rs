@@ -1,4 +1,4 @@
-use crate::heads::{Nodding, shipped, states};
+use crate::dynamics::heads::{Nodding, shipped, states};
 use zsim::dynamics::HeadState;
 use zsim::geometry::{Kinematics, Pose, Rotation, Route, Vector, gravity_in_world};
 use zsim::motion::BaseMotion;

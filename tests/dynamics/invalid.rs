@@ -1,4 +1,4 @@
-use crate::heads::{ReferenceHead, built, cord, floating, jointed, moored, suspended};
+use crate::dynamics::heads::{ReferenceHead, built, cord, floating, jointed, moored, suspended};
 
 /// The error of the reference head with one replacement in its text.
 fn error_with(from: &str, to: &str) -> String {

@@ -1,4 +1,4 @@
-use crate::heads::{Nodding, shipped, states};
+use crate::dynamics::heads::{Nodding, shipped, states};
 use zsim::dynamics::HeadModel;
 use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};
 use zsim::motion::BaseMotion;

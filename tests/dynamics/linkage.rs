@@ -1,4 +1,4 @@
-use crate::heads::{BasePulse, Nodding, ReferenceHead, displacement, shipped, states};
+use crate::dynamics::heads::{BasePulse, Nodding, ReferenceHead, displacement, shipped, states};
 use zsim::dynamics::{DynamicsError, HeadSimulation};
 use zsim::geometry::{Kinematics, Pose, Vector};
 use zsim::motion::BaseMotion;

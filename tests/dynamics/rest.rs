@@ -1,4 +1,4 @@
-use crate::heads::{FixedBase, ReferenceHead, built, shipped, states};
+use crate::dynamics::heads::{FixedBase, ReferenceHead, built, shipped, states};
 use approx::assert_relative_eq;
 use nalgebra::{Matrix2, Vector2};
 use zsim::dynamics::{HeadSpec, LinkageSpec, ModeKind};

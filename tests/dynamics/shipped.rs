@@ -1,6 +1,6 @@
 //! The shipped heads: plausible modes, swing in a hand, and small-swing gains of the linear model.
 
-use crate::heads::shipped;
+use crate::dynamics::heads::shipped;
 use zsim::dynamics::{DampingSpec, HeadModel, HeadSimulation, LinkageSpec, MotorSpec, TurnSpec, load};
 use zsim::motion::Axis;
 use zsim::random::Seed;

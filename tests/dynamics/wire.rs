@@ -1,6 +1,6 @@
 //! The spring's own mass compared with continuous springs and beams.
 
-use crate::heads::built;
+use crate::dynamics::heads::built;
 use approx::assert_relative_eq;
 use std::f64::consts::TAU;
 use zsim::dynamics::{HeadModel, ModeKind};

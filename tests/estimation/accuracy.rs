@@ -1,6 +1,6 @@
 //! The estimator on closed-form walks: accuracy, repeatability, and imperfect recordings.
 
-use crate::fixture::{Room, Run, Score, Walk, calibration};
+use crate::estimation::fixture::{Room, Run, Score, Walk, calibration};
 use zsim::estimation::{
     Discarded, EstimationError, Estimator, EstimatorSpec, OpenLoop, WarningKind, estimate_all, load,
 };

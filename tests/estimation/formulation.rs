@@ -1,6 +1,6 @@
 //! The paper's formulation of the window: trajectory in lidar time, clock offset in the IMU residuals, second differences.
 
-use crate::fixture::{Room, Run, Score, Walk, calibration};
+use crate::estimation::fixture::{Room, Run, Score, Walk, calibration};
 use zsim::estimation::{EstimatorSpec, Formulation, OpenLoop, estimate_all, load};
 
 /// A walk through a furnished hall with the IMU's clock off by `offset_s`.

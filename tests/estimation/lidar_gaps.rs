@@ -1,6 +1,6 @@
 //! Gaps of the lidar in which the estimate stops and the IMU goes on.
 
-use crate::fixture::{Room, Run, Score, Walk, calibration};
+use crate::estimation::fixture::{Room, Run, Score, Walk, calibration};
 use zsim::estimation::{WarningKind, estimate_all, load};
 use zsim::measurement::Measurement;
 

@@ -1,6 +1,6 @@
 //! Loop closure by global registration, on closed-form walks and on scenes.
 
-use crate::fixture::{Room, Run, Score, Walk, calibration};
+use crate::estimation::fixture::{Room, Run, Score, Walk, calibration};
 use zsim::estimation::{ClosedLoop, Estimator, OpenLoop, RegistrationInput, load, register};
 use zsim::evaluation::{Errors, Pairs};
 use zsim::geometry::{Pose, Rotation, Trajectory, Vector};

@@ -1,6 +1,6 @@
 //! The estimator while the head does not swing: stops, and a multi-plane lidar that needs no swing.
 
-use crate::fixture::{Room, Run, Scanner, Score, Walk, calibration, growth_m};
+use crate::estimation::fixture::{Room, Run, Scanner, Score, Walk, calibration, growth_m};
 use zsim::estimation::{EstimatorSpec, estimate_all, load};
 use zsim::geometry::{Rotation, Vector};
 

@@ -1,7 +1,7 @@
 //! ROS 1 bags and rosbag2 databases give the same measurements as an MCAP file with the same messages.
 
-use crate::foreign::bag::{Logged, Ros1, bag, database};
-use crate::foreign::{Foreign, IMU, POINTS, SCAN, TF, UINT32, cdr, cloud, imu, scan, select, transform};
+use crate::recording::foreign::bag::{Logged, Ros1, bag, database};
+use crate::recording::foreign::{Foreign, IMU, POINTS, SCAN, TF, UINT32, cdr, cloud, imu, scan, select, transform};
 use std::io::Cursor;
 use zsim::geometry::Pose;
 use zsim::measurement::{Calibration, ImuAveraging, ImuNoise, LidarNoise, Measurement};

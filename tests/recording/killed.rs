@@ -26,7 +26,7 @@ fn a_killed_process_loses_only_its_last_chunk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "killed::record_until_killed", "--ignored"])
+        .args(["--exact", "recording::killed::record_until_killed", "--ignored"])
         .env(FILE, &path)
         .stdout(Stdio::null())
         .spawn()

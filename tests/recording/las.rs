@@ -1,6 +1,6 @@
 //! laspy reads clouds written as LAS. The test is skipped if laspy is not installed.
 
-use crate::readers::python;
+use crate::recording::readers::python;
 use crate::skip::run_or_skip;
 use std::fmt::Write;
 use std::fs::File;

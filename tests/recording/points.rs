@@ -1,6 +1,6 @@
 //! Point times in the encodings of different drivers.
 
-use crate::foreign::{FLOAT32, FLOAT64, Foreign, IMU, POINTS, UINT32, cloud, imu, scans, select};
+use crate::recording::foreign::{FLOAT32, FLOAT64, Foreign, IMU, POINTS, UINT32, cloud, imu, scans, select};
 use zsim::time::{Span, Stamp};
 
 #[test]

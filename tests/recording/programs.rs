@@ -1,6 +1,6 @@
 //! Recordings of other programs: other topics, message types, compression and order.
 
-use crate::foreign::{
+use crate::recording::foreign::{
     Foreign, IMU, Imu, POINTS, SCAN, TF, TransformStamped, UINT32, cloud, header, imu, scan, scans, select, transform,
 };
 use std::io::Cursor;

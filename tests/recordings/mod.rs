@@ -1,7 +1,5 @@
 //! A small recording for the tests of writing and reading.
 
-#![allow(dead_code, reason = "each test binary uses a part of it")]
-
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 use zsim::geometry::{Kinematics, Pose, Vector, from_roll_pitch_yaw};

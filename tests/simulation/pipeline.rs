@@ -1,6 +1,6 @@
 //! The simulation pipeline with a closed-form head motion in a closed-form world.
 
-use crate::memory_sink::MemorySink;
+use crate::simulation::memory_sink::MemorySink;
 use crate::strapdown::integrate;
 use std::f64::consts::PI;
 use zsim::dynamics::{DynamicsError, HeadState};

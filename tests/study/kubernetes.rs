@@ -1,7 +1,7 @@
 //! A sweep as an Indexed Job, run by a stand-in for Kubernetes that kills pods.
 
 use crate::command::run;
-use crate::slurm::SWEEP;
+use crate::study::slurm::SWEEP;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

@@ -1,7 +1,7 @@
 //! Split IMU messages, units and conventions of accelerations, and stamps of another epoch.
 
 use super::{MS, START_NS, moving, room};
-use crate::foreign::{self, Foreign, IMU, SCAN, select};
+use crate::recording::foreign::{self, Foreign, IMU, SCAN, select};
 use zsim::measurement::{ImuSample, Measurement};
 use zsim::recording::{Reader, TopicPreference};
 

@@ -1,7 +1,9 @@
 //! Beams without a return, and scans and clouds that are empty or cannot be decoded.
 
 use super::{Fields, MS, START_NS, point_cloud, room, wall_m};
-use crate::foreign::{FLOAT32, Foreign, IMU, LaserScan, POINTS, SCAN, UINT32, header, imu, scan, scans, select};
+use crate::recording::foreign::{
+    FLOAT32, Foreign, IMU, LaserScan, POINTS, SCAN, UINT32, header, imu, scan, scans, select,
+};
 use zsim::recording::{Reader, TopicPreference};
 
 const XYZ: Fields<'static> = &[("x", 0, FLOAT32), ("y", 4, FLOAT32), ("z", 8, FLOAT32), ("t", 12, UINT32)];

@@ -4,7 +4,7 @@ mod imu;
 mod misses;
 mod points;
 
-use crate::foreign::{self, Foreign, IMU, LaserScan, PointCloud2, PointField, SCAN, header, imu, select};
+use crate::recording::foreign::{self, Foreign, IMU, LaserScan, PointCloud2, PointField, SCAN, header, imu, select};
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
 const MS: i64 = 1_000_000;

@@ -1,8 +1,10 @@
 //! Point times of different drivers, and lidars with several echoes.
 
 use super::{Fields, MS, START_NS, point_cloud};
-use crate::foreign::bag::{Ros1, bag};
-use crate::foreign::{FLOAT32, FLOAT64, Foreign, Header, IMU, POINTS, UINT32, cdr, header, imu, scans, select};
+use crate::recording::foreign::bag::{Ros1, bag};
+use crate::recording::foreign::{
+    FLOAT32, FLOAT64, Foreign, Header, IMU, POINTS, UINT32, cdr, header, imu, scans, select,
+};
 use serde::Serialize;
 use zsim::measurement::LidarScan;
 use zsim::recording::Reader;

@@ -4,7 +4,7 @@ mod delivery;
 mod spec;
 mod values;
 
-use crate::memory_sink::MemorySink;
+use crate::simulation::memory_sink::MemorySink;
 use std::sync::OnceLock;
 use zsim::random::Seed;
 use zsim::simulation::{EPOCH, Named, Run, Scenario, Simulation, SimulationError};

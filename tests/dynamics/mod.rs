@@ -1,6 +1,4 @@
 //! The simulated head and its spring compared with linear models, closed forms and conservation laws.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
-
 mod actuated;
 mod base;
 mod contact;

@@ -1,7 +1,5 @@
 //! Worlds: scenes, meshes, movers, ray casts, and invalid files.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
-
 mod casts;
 mod exports;
 mod includes;

@@ -1,0 +1,4 @@
+//! The report in a browser.
+
+mod live;
+mod page;
