@@ -1,7 +1,7 @@
 //! Valid range of an integer key of a spec, for the error about a value out of range.
 
 use super::Source;
-use super::ron_options::options;
+use super::ron_text::from_text;
 use ron::error::{Position, SpannedError};
 use serde::de::DeserializeOwned;
 
@@ -32,7 +32,7 @@ pub(super) fn message<T: DeserializeOwned>(source: &Source, error: &SpannedError
         let tried = format!("{}{number}{}", &text[..start], &text[end..]);
         let end = start + number.len();
         // An error further on is about another key.
-        options().from_str::<T>(&tried).map_or_else(|other| offset(&tried, other.span.start) > Some(end), |_| true)
+        from_text::<T>(&tried).map_or_else(|other| offset(&tried, other.span.start) > Some(end), |_| true)
     };
     let upper = UPPER_LIMITS.into_iter().find(accepts)?;
     let lower = LOWER_LIMITS.into_iter().find(accepts)?;

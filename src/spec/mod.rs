@@ -9,7 +9,7 @@ mod bounds;
 pub mod checked;
 mod error;
 mod library;
-mod ron_options;
+mod ron_text;
 mod source;
 mod unit;
 
@@ -18,7 +18,6 @@ pub use library::{Kind, MAX_SPEC_BYTES, find, find_from, name_from, names, text_
 pub use source::Source;
 pub use unit::split_unit;
 
-use ron_options::options;
 use serde::de::DeserializeOwned;
 
 /// Parses the text of a spec.
@@ -26,7 +25,7 @@ use serde::de::DeserializeOwned;
 /// # Errors
 /// A [`SpecError`] with line and column for invalid syntax, unknown or missing keys, and numbers out of range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
-    options().from_str(&source.text).map_err(|error| {
+    ron_text::from_text(&source.text).map_err(|error| {
         let bounds = match error.code {
             ron::Error::IntegerOutOfBounds => bounds::message::<T>(source, &error),
             _ => None,
@@ -49,5 +48,5 @@ pub fn load<T: DeserializeOwned>(kind: Kind, name: &str) -> Result<T, SpecError>
 /// If RON cannot represent the value.
 pub fn to_text<T: serde::Serialize>(value: &T) -> Result<String, SpecError> {
     let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(12);
-    options().to_string_pretty(value, pretty).map_err(|error| SpecError::plain("a spec", error.to_string()))
+    ron_text::to_text(value, pretty).map_err(|error| SpecError::plain("a spec", error.to_string()))
 }
