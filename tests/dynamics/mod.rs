@@ -1,4 +1,5 @@
 //! The simulated head and its spring compared with linear models, closed forms and conservation laws.
+
 mod actuated;
 mod base;
 mod contact;

@@ -107,7 +107,7 @@ fn an_incorrect_record_length_loses_at_most_its_chunk() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(super::property_test())]
 
     #[test]
     fn flipped_bits_never_panic_and_never_invent_a_measurement(

@@ -121,7 +121,7 @@ fn any_sweep() -> impl Strategy<Value = LidarScan> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(super::property_test())]
 
     #[test]
     fn any_sweep_is_read_back_bit_for_bit(sweeps in prop::collection::vec(any_sweep(), 1..5)) {
