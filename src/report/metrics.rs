@@ -106,6 +106,10 @@ pub struct ClosedLoopMetrics {
     pub rotation_rmse_deg: Option<f64>,
     /// Cramer-Rao bound of the RMS position error after alignment, m.
     pub bound_rmse_m: Option<f64>,
+    /// Mean normalised estimation error squared of the position; 3 for a consistent covariance.
+    pub position_nees: Option<f64>,
+    /// Mean normalised estimation error squared of the attitude; 3 for a consistent covariance.
+    pub attitude_nees: Option<f64>,
     /// Loop closures.
     pub loops: LoopMetrics,
     /// Reason why the loop closure was not applied; `None` if it was.
@@ -240,6 +244,8 @@ mod tests {
         "position_rmse_m",
         "rotation_rmse_deg",
         "bound_rmse_m",
+        "position_nees",
+        "attitude_nees",
         "loops",
         "proposed",
         "verified",

@@ -1,12 +1,15 @@
 //! The trajectory that an estimate results in.
 
 use super::comparison::Comparison;
-use crate::geometry::Trajectory;
+use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::LidarCorrection;
+use crate::time::Stamp;
 
 /// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
 pub(super) struct BestEstimate<'a> {
     pub map_from_head: &'a Trajectory,
+    /// Covariances at some of its stamps.
+    pub covariances: &'a [(Stamp, PoseCovariance)],
     /// The open-loop trajectory in which the surfels were observed.
     pub observed_trajectory: &'a Trajectory,
     /// Estimated correction of the lidar calibration.

@@ -2,14 +2,17 @@
 
 use super::open_loop::OpenLoopRun;
 use crate::estimation::{EstimationError, EstimatorSpec, LoopReport, RegistrationInput, register};
-use crate::geometry::Trajectory;
+use crate::geometry::{PoseCovariance, Trajectory};
 use crate::measurement::{Calibration, LidarCorrection};
+use crate::time::Stamp;
 use std::time::Instant;
 
 /// Result of the global registration.
 pub(super) struct ClosedLoopRun {
     /// The estimate, at the open loop's stamps.
     pub map_from_head: Trajectory,
+    /// Covariances of the poses, at the stamps of the open loop's.
+    pub covariances: Vec<(Stamp, PoseCovariance)>,
     /// Estimated correction of the lidar calibration.
     pub lidar: LidarCorrection,
     /// The open-loop trajectory with the estimated lidar extrinsics, if these were estimated.
@@ -41,6 +44,7 @@ pub(super) fn run_closed_loop(
     });
     Ok(ClosedLoopRun {
         map_from_head: closed.trajectory,
+        covariances: closed.covariances,
         lidar: closed.lidar,
         open_loop_recalibrated: closed.open_loop_recalibrated,
         loops,

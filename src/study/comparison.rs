@@ -118,12 +118,15 @@ pub(super) fn closed_loop_metrics(
     acquisition_s: f64,
 ) -> ClosedLoopMetrics {
     let errors = comparison.and_then(|found| found.errors.as_ref());
+    let consistency = comparison.and_then(|found| found.consistency);
     ClosedLoopMetrics {
         wall_s: Some(run.wall_s),
         fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|fraction| fraction.is_finite()),
         position_rmse_m: errors.map(|errors| errors.position_rmse_m),
         rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
         bound_rmse_m: None,
+        position_nees: consistency.map(|found| found.position_nees),
+        attitude_nees: consistency.map(|found| found.attitude_nees),
         loops: LoopMetrics {
             proposed: Some(run.loops.proposed as u64),
             verified: Some(run.loops.verified as u64),

@@ -201,7 +201,7 @@ impl<'a> LoopInputs<'a> {
             calibration: &self.found.calibration,
             body_frame: &self.found.body_frame,
             map_from_head: best.map_from_head,
-            covariances: &loops.open.covariances,
+            covariances: best.covariances,
             lidar: best.lidar,
             returns: loops.open.returns,
             with_truth,
@@ -247,11 +247,11 @@ impl<'a> LoopInputs<'a> {
             true => SampledTruth::read(reader, &open, bound)?,
             false => None,
         };
-        let mut compare = |map_from_head, covariances| {
+        let mut compare = |map_from_head, covariances: &[_]| {
             truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, watch))
         };
-        let comparison = compare(&open.map_from_head, &open.covariances[..]);
-        let closed_comparison = closed.as_ref().and_then(|closed| compare(&closed.map_from_head, &[]));
+        let comparison = compare(&open.map_from_head, &open.covariances);
+        let closed_comparison = closed.as_ref().and_then(|closed| compare(&closed.map_from_head, &closed.covariances));
         let loops = Loops { open, truth, comparison, closed, closed_comparison };
         if writes_map && !loops.open.observed.is_empty() {
             write_map(&loops.open, &loops.best(), estimator, prior_map, folder)?;
@@ -273,14 +273,16 @@ impl Loops {
     fn best(&self) -> BestEstimate<'_> {
         let open = &self.open.map_from_head;
         match &self.closed {
-            Some(ClosedLoopRun { map_from_head, lidar, open_loop_recalibrated, .. }) => BestEstimate {
+            Some(ClosedLoopRun { map_from_head, covariances, lidar, open_loop_recalibrated, .. }) => BestEstimate {
                 map_from_head,
+                covariances,
                 observed_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
                 lidar,
                 comparison: self.closed_comparison.as_ref(),
             },
             None => BestEstimate {
                 map_from_head: open,
+                covariances: &self.open.covariances,
                 observed_trajectory: open,
                 lidar: &self.open.lidar,
                 comparison: self.comparison.as_ref(),

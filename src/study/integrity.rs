@@ -41,14 +41,16 @@ pub(super) struct PoseBound {
     pub sigmas: [f64; 6],
 }
 
-/// Computes the error bound of each pose of `trajectory`.
-fn bounds(run: &OpenLoopRun, trajectory: &Trajectory) -> Vec<PoseBound> {
+/// Computes the error bound of each pose of `trajectory`, whose `covariances` have the stamps of the open loop's.
+///
+/// The bound is that of the open loop: the closed loop is closer, but its matches cannot detect an error that they contain.
+fn bounds(run: &OpenLoopRun, trajectory: &Trajectory, covariances: &[(Stamp, PoseCovariance)]) -> Vec<PoseBound> {
     let doubts = bound_factors(&run.windows);
     let aligned_until = aligned_until(trajectory).unwrap_or(run.recorded.0);
     let ratio = aligned_error_ratio(trajectory);
     let radii_m = radii(run);
     let ambiguities = ambiguities(run);
-    let mut covariances = run.covariances.iter().zip(&radii_m).peekable();
+    let mut covariances = covariances.iter().zip(&radii_m).peekable();
     let mut current: Option<(&PoseCovariance, f64)> = None;
     let bound = |stamp: Stamp| {
         while let Some(((_, covariance), radius_m)) = covariances.next_if(|((at, _), _)| *at <= stamp) {
@@ -130,7 +132,8 @@ pub(super) struct Integrity {
 impl Integrity {
     /// Computes the integrity of the result `trajectory`: that of the closed loop if there is one, else of the open loop.
     pub fn of(run: &OpenLoopRun, closed: Option<&ClosedLoopRun>, trajectory: &Trajectory) -> Self {
-        let mut bounds = bounds(run, trajectory);
+        let covariances = closed.map_or(&run.covariances, |closed| &closed.covariances);
+        let mut bounds = bounds(run, trajectory, covariances);
         let ends = |stamps: &[Stamp]| Some((*stamps.first()?, *stamps.last()?));
         let estimated = ends(trajectory.stamps()).unwrap_or(run.recorded);
         let evidence = Evidence {

@@ -53,6 +53,12 @@ impl BlockMatrix {
         }
     }
 
+    /// The blocks of the lower triangle: row, column, block.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, usize, &Matrix6<f64>)> {
+        let rows = self.columns.iter().zip(&self.blocks).enumerate();
+        rows.flat_map(|(row, (columns, blocks))| columns.iter().zip(blocks).map(move |(k, b)| (row, *k as usize, b)))
+    }
+
     /// Adds the product with `x` to `sum`.
     pub(super) fn add_product(&self, x: &[f64], sum: &mut [f64]) {
         let at = |knot: usize| Vector6::from_column_slice(&x[6 * knot..6 * knot + 6]);

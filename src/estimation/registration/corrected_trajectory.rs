@@ -58,6 +58,15 @@ struct Node {
     covariance: Matrix6<f64>,
 }
 
+/// A time of the corrected trajectory.
+#[derive(Debug, Clone)]
+pub(super) struct Epoch {
+    pub(super) stamp: Stamp,
+    pub(super) basis: Basis,
+    /// Corrected position, m.
+    pub(super) position: Vector,
+}
+
 impl CorrectedTrajectory {
     /// Starts with the trajectory `map_from_head`; `None` if it has fewer than two poses. Its motion is to remain that of
     /// `measured`, which has the same stamps.
@@ -119,6 +128,17 @@ impl CorrectedTrajectory {
         self
     }
 
+    /// At most `count` of the nodes, evenly distributed, with the first and the last one; `count` is at least 2.
+    pub(super) fn epochs(&self, count: usize) -> Vec<Epoch> {
+        let last = self.nodes.len() - 1;
+        let spaces = (count - 1).min(last);
+        let epoch = |k: usize| {
+            let Node { stamp, basis, position, .. } = &self.nodes[k * last / spaces];
+            Epoch { stamp: *stamp, basis: *basis, position: *position }
+        };
+        (0..=spaces).map(epoch).collect()
+    }
+
     /// First and last time, s.
     pub(super) fn span_s(&self) -> (f64, f64) {
         (self.times_s[0], self.times_s[self.times_s.len() - 1])
@@ -129,6 +149,13 @@ impl CorrectedTrajectory {
         let (start_s, end_s) = self.span_s();
         let first = Basis::at(start_s, self.spacing_s).first;
         (first, (Basis::at(end_s, self.spacing_s).first + 4 - first) as usize)
+    }
+
+    /// Corrected position in the middle of the time that each knot influences, m.
+    pub(super) fn knot_positions(&self) -> Vec<Vector> {
+        let (first, count) = self.knots();
+        let position = |k| self.pose_at((first + k as i64 - 1) as f64 * self.spacing_s).translation.vector;
+        (0..count).map(position).collect()
     }
 
     /// The correction spline's basis at `tau_s`.

@@ -13,6 +13,8 @@ use nalgebra::{Cholesky, Const, Matrix6, SMatrix, SVector, Vector6};
 pub(super) const SHARED_DIMENSION: usize = 2;
 /// Vector over the shared unknowns: a derivative or a step.
 pub(super) type Shared = SVector<f64, SHARED_DIMENSION>;
+/// Cross block: rows of a correction, columns of the shared unknowns.
+pub(super) type SharedBlock = SMatrix<f64, 6, SHARED_DIMENSION>;
 
 /// Maximum distance of two spline segments for a local term: open-loop motion couples adjacent segments.
 const LOCAL_DISTANCE: i64 = 1;
@@ -33,8 +35,7 @@ pub(super) struct PairTerm {
 pub(super) struct UnaryTerm {
     pub(super) square: Matrix6<f64>,
     pub(super) right: Vector6<f64>,
-    /// Cross block: rows of the correction, columns of the shared unknowns.
-    shared: SMatrix<f64, 6, SHARED_DIMENSION>,
+    shared: SharedBlock,
 }
 
 /// Normal equations of the shared unknowns.
@@ -100,7 +101,7 @@ pub(super) struct Equations {
     remote: BlockMatrix,
     right: Vec<f64>,
     /// Cross blocks of each knot with the shared unknowns.
-    shared: Vec<SMatrix<f64, 6, SHARED_DIMENSION>>,
+    shared: Vec<SharedBlock>,
     pub(super) shared_term: SharedTerm,
 }
 
@@ -138,7 +139,8 @@ impl Equations {
         self.shared_term = SharedTerm::default();
     }
 
-    fn knots_of(&self, basis: &Basis) -> [(usize, f64); KNOTS] {
+    /// Indices and values of the knots at the time of `basis`.
+    pub(super) fn knots_of(&self, basis: &Basis) -> [(usize, f64); KNOTS] {
         let first = (basis.first - self.first_knot) as usize;
         std::array::from_fn(|a| (first + a, basis.value[a]))
     }
@@ -189,6 +191,16 @@ impl Equations {
         let shared = Shared::from_iterator(x.drain(self.right.len()..));
         Some((x, shared))
     }
+
+    /// Blocks of the lower triangle between knots: row, column, block. Blocks of the same knots may repeat, and add.
+    pub(super) fn blocks(&self) -> impl Iterator<Item = (usize, usize, &Matrix6<f64>)> {
+        self.local.iter().chain(self.remote.iter())
+    }
+
+    /// Blocks between each knot and the shared unknowns, and that of the shared unknowns.
+    pub(super) fn shared_blocks(&self) -> (&[SharedBlock], &SMatrix<f64, SHARED_DIMENSION, SHARED_DIMENSION>) {
+        (&self.shared, &self.shared_term.square)
+    }
 }
 
 fn is_local(first: i64, second: i64) -> bool {
@@ -229,7 +241,9 @@ impl PreconditionedSystem for LocallyPreconditioned<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::reduction::Reduction;
     use super::*;
+    use crate::geometry::Vector;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
 
@@ -237,16 +251,23 @@ mod tests {
         Vector6::from_fn(|r, _| ((k * 7 + r * r * 3 + r * k) as f64 * 0.41).sin())
     }
 
-    /// Compares with a dense Jacobian of every residual and `(J^T W J + I) x = -J^T W e` by an LU factorisation.
-    #[test]
-    fn solution_matches_the_dense_equations() {
-        let (h, knots, first_knot) = (0.7, 13, -1);
-        let of_knots = 6 * knots;
+    /// Equations and the same with a dense Jacobian of every residual: `J^T W J + I` and `-J^T W e`.
+    struct Example {
+        equations: Equations,
+        dense: DMatrix<f64>,
+        right: DVector<f64>,
+        bases: [(Basis, Basis); 5],
+    }
+
+    const FIRST_KNOT: i64 = -1;
+    const OF_KNOTS: usize = 6 * 13;
+    const SIZE: usize = OF_KNOTS + SHARED_DIMENSION;
+
+    fn example() -> Example {
         let times_s = [(0.1, 5.9), (0.2, 0.4), (3.0, 3.6), (5.5, 1.2), (2.2, 4.1)];
-        let bases = times_s.map(|(a, b)| (Basis::at(a, h), Basis::at(b, h)));
-        let mut equations = Equations::new(first_knot, knots, bases.iter().map(|(a, b)| (a.first, b.first)));
-        let size = of_knots + SHARED_DIMENSION;
-        let (mut dense, mut right) = (DMatrix::<f64>::identity(size, size), DVector::<f64>::zeros(size));
+        let bases = times_s.map(|(a, b)| (Basis::at(a, 0.7), Basis::at(b, 0.7)));
+        let mut equations = Equations::new(FIRST_KNOT, OF_KNOTS / 6, bases.iter().map(|(a, b)| (a.first, b.first)));
+        let (mut dense, mut right) = (DMatrix::<f64>::identity(SIZE, SIZE), DVector::<f64>::zeros(SIZE));
         for (k, (a, b)) in bases.iter().enumerate() {
             let mut pair_term = PairTerm::default();
             for m in 0..5 {
@@ -256,15 +277,8 @@ mod tests {
                 pair_term.first.add_shared(&by_a, &by_shared, weight);
                 pair_term.second.add_shared(&by_b, &by_shared, weight);
                 equations.shared_term.add(&by_shared, e, weight);
-                let mut row = DVector::<f64>::zeros(size);
-                row.rows_mut(of_knots, SHARED_DIMENSION).copy_from(&by_shared);
-                for (basis, by) in [(a, by_a), (b, by_b)] {
-                    for (c, value) in basis.value.iter().enumerate() {
-                        let at = 6 * ((basis.first - first_knot) as usize + c);
-                        let mut part = row.rows_mut(at, 6);
-                        part += by * *value;
-                    }
-                }
+                let mut row = at_time(a).tr_mul(&by_a) + at_time(b).tr_mul(&by_b);
+                row.rows_mut(OF_KNOTS, SHARED_DIMENSION).copy_from(&by_shared);
                 dense += &row * row.transpose() * weight;
                 right -= row * (e * weight);
             }
@@ -273,18 +287,57 @@ mod tests {
             equations.add_cross(a, b, &pair_term.cross);
         }
         equations.add_diagonal(1.0);
+        Example { equations, dense, right, bases }
+    }
+
+    /// The correction at a time, by the unknowns.
+    fn at_time(basis: &Basis) -> DMatrix<f64> {
+        let mut rows = DMatrix::<f64>::zeros(6, SIZE);
+        for (c, value) in basis.value.iter().enumerate() {
+            let at = 6 * ((basis.first - FIRST_KNOT) as usize + c);
+            rows.view_mut((0, at), (6, 6)).fill_diagonal(*value);
+        }
+        rows
+    }
+
+    #[test]
+    fn solution_matches_the_dense_equations() {
+        let Example { equations, dense, right, .. } = example();
         let expected = dense.lu().solve(&right).unwrap();
         let (x, shared) = equations.solve().unwrap();
-        let solved = DVector::from_iterator(size, x.iter().chain(shared.iter()).copied());
+        let solved = DVector::from_iterator(SIZE, x.iter().chain(shared.iter()).copied());
         assert!((&solved - &expected).norm() < 1e-6 * expected.norm(), "{solved} {expected}");
         // The shared unknowns depend on all knots and are the harder part.
-        for (x, y) in shared.iter().zip(expected.iter().skip(of_knots)) {
+        for (x, y) in shared.iter().zip(expected.iter().skip(OF_KNOTS)) {
             assert_relative_eq!(x, y, max_relative = 1e-5);
         }
     }
 
     #[test]
+    fn covariances_are_those_of_the_dense_equations_and_smaller_with_fewer_nodes() {
+        let Example { equations, dense, bases, .. } = example();
+        let (inverse, times) = (dense.try_inverse().unwrap(), bases.map(|(a, _)| a));
+        let positions: Vec<Vector> = (0..OF_KNOTS / 6).map(|k| Vector::new(k as f64, (k as f64).sin(), 0.0)).collect();
+        let of_all = Reduction::new(&positions, OF_KNOTS / 6).covariances(&equations, &times).unwrap();
+        let of_few = Reduction::new(&positions, 5).covariances(&equations, &times).unwrap();
+        let first = at_time(&times[0]);
+        for ((basis, found), few) in times.iter().zip(of_all).zip(of_few) {
+            let between = |other: &DMatrix<f64>| {
+                let between = at_time(basis) * &inverse * other.transpose();
+                Matrix6::from_column_slice(between.as_slice())
+            };
+            assert_relative_eq!(found.own, between(&at_time(basis)), epsilon = 1e-12);
+            assert_relative_eq!(found.with_first, between(&first), epsilon = 1e-12);
+            let excess = (found.own - few.own).symmetric_eigenvalues();
+            assert!(excess.min() > -1e-12 && excess.max() > 1e-3, "{excess}");
+        }
+    }
+
+    #[test]
     fn singular_equations_have_no_solution() {
-        assert_eq!(Equations::new(0, 5, std::iter::empty()).solve(), None);
+        let singular = Equations::new(0, 5, std::iter::empty());
+        assert_eq!(singular.solve(), None);
+        let reduction = Reduction::new(&[Vector::zeros(); 5], 3);
+        assert_eq!(reduction.covariances(&singular, &[Basis::at(0.3, 1.0)]), None);
     }
 }

@@ -30,6 +30,7 @@ mod lidar_model;
 mod matches;
 mod neighbours;
 mod places;
+mod reduction;
 mod scene;
 mod sensed_motion;
 mod spec;
@@ -37,6 +38,7 @@ mod submaps;
 #[cfg(test)]
 mod tests;
 mod trajectory_difference;
+mod uncertainty;
 
 pub use places::{LoopReport, PlacesSpec};
 pub use spec::RegistrationSpec;
@@ -66,11 +68,16 @@ const MAX_ROUNDS: usize = 6;
 /// These registrations end when the trajectory moves by less than this, m.
 const ROUNDS_CONVERGED_M: f64 = 0.002;
 
+/// Reason of a rejection.
+const SINGULAR: &str = "the normal equations are singular";
+
 /// Result of the global registration.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ClosedLoop {
     /// Loop-closed `map_from_head` at the stamps of the open loop, lidar time.
     pub trajectory: Trajectory,
+    /// Covariances of the poses at the stamps of those of the open loop: position, then attitude, relative to the first pose.
+    pub covariances: Vec<(Stamp, PoseCovariance)>,
     /// Estimated correction of the lidar calibration.
     pub lidar: LidarCorrection,
     /// The open-loop trajectory, recomputed with the final lidar extrinsics; `None` if these were not estimated.
@@ -145,7 +152,16 @@ pub fn register(
     let trajectory = restored(&closed.trajectory, stamps)?;
     let open_loop_recalibrated =
         closed.open_loop_recalibrated.map(|trajectory| restored(&trajectory, stamps)).transpose()?;
-    Ok(ClosedLoop { trajectory, open_loop_recalibrated, ..closed })
+    let covariances = at_stamps_of(input.covariances, closed.covariances.into_iter().map(|(_, covariance)| covariance));
+    Ok(ClosedLoop { trajectory, covariances, open_loop_recalibrated, ..closed })
+}
+
+/// The covariances `of` at the stamps of `open_loop`.
+fn at_stamps_of(
+    open_loop: &[(Stamp, PoseCovariance)],
+    of: impl IntoIterator<Item = PoseCovariance>,
+) -> Vec<(Stamp, PoseCovariance)> {
+    open_loop.iter().map(|(stamp, _)| *stamp).zip(of).collect()
 }
 
 fn register_without_gaps(
@@ -162,14 +178,22 @@ fn register_without_gaps(
     let problem =
         Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
     let closed = match problem.solve(LidarModel::new(calibration, lidar, observed, spec)) {
-        Ok((Registered { trajectory, lidar_model }, report)) => {
+        Ok((Registered { trajectory, covariances, lidar_model }, report)) => {
             let moved = largest_difference(map_from_head, &trajectory);
             let report = RegistrationReport { moved, weak_range_m: lidar_model.weak_range_m, ..report };
-            ClosedLoop { trajectory, lidar: lidar_model.lidar, open_loop_recalibrated: recalibrated, report }
+            let covariances = at_stamps_of(input.covariances, covariances);
+            ClosedLoop {
+                trajectory,
+                covariances,
+                lidar: lidar_model.lidar,
+                open_loop_recalibrated: recalibrated,
+                report,
+            }
         }
         Err(rejection) => {
             let report = RegistrationReport { rejected_because: Some(rejection.1), ..rejection.0 };
-            ClosedLoop { trajectory: input.map_from_head.clone(), lidar: *lidar, report, ..ClosedLoop::default() }
+            let (trajectory, covariances) = (input.map_from_head.clone(), input.covariances.to_vec());
+            ClosedLoop { trajectory, covariances, lidar: *lidar, report, ..ClosedLoop::default() }
         }
     };
     Ok(closed)
@@ -189,6 +213,8 @@ struct Problem<'a> {
 /// The registered trajectory and lidar model.
 struct Registered {
     trajectory: Trajectory,
+    /// At the stamps of the open loop's.
+    covariances: Vec<PoseCovariance>,
     lidar_model: LidarModel,
 }
 
@@ -208,12 +234,30 @@ impl Problem<'_> {
         if let Some(pre_aligned) = pre_aligned {
             return self.register_pre_aligned(pre_aligned, lidar_model, report);
         }
-        let ((corrected, lidar_model), report) = Registration::run(self, corrected, lidar_model, observed, report)?;
+        let (Solution { corrected, lidar_model, equations }, report) =
+            Registration::run(self, corrected, lidar_model, observed, report)?;
         if report.conditioning < self.spec.weak_conditioning && report.revisited < self.spec.min_seen_again {
             return Err(Box::new((report, "too few revisited surfaces constrain the weakest direction")));
         }
+        let covariances = self.covariances(&corrected, &equations, report)?;
         let trajectory = trajectory_of(corrected, map_from_head.stamps(), report)?;
-        Ok((Registered { trajectory, lidar_model }, report))
+        Ok((Registered { trajectory, covariances, lidar_model }, report))
+    }
+
+    /// The covariances of the corrected poses at the stamps of the open loop's; those of the open loop if few surfaces were
+    /// revisited. The equations count the errors of successive motions as independent, which along a corridor they are not.
+    fn covariances(
+        &self,
+        corrected: &CorrectedTrajectory,
+        equations: &Equations,
+        report: RegistrationReport,
+    ) -> Result<Vec<PoseCovariance>, Box<(RegistrationReport, &'static str)>> {
+        let of_open_loop = self.input.covariances;
+        if report.revisited < self.spec.min_seen_again {
+            return Ok(of_open_loop.iter().map(|(_, covariance)| *covariance).collect());
+        }
+        let stamps = of_open_loop.iter().map(|(stamp, _)| *stamp);
+        uncertainty::covariances(corrected, equations, stamps).ok_or_else(|| Box::new((report, SINGULAR)))
     }
 
     /// Registers a trajectory that was pre-aligned to loop closures.
@@ -227,14 +271,16 @@ impl Problem<'_> {
         mut report: RegistrationReport,
     ) -> RegistrationResult<Registered> {
         let RegistrationInput { map_from_head, covariances, .. } = self.input;
+        let mut of_poses = Vec::new();
         for _ in 0..MAX_ROUNDS {
             let (start, origin) = (&pre_aligned.trajectory, pre_aligned.observed.origin);
             let corrected = CorrectedTrajectory::new(start, start, covariances, origin, self.spec);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
             let corrected = corrected.with_gravity_from(map_from_head, &pre_aligned.trajectory);
             let registered = Registration::run(self, corrected, lidar_model, &pre_aligned.observed, report)?;
-            let ((corrected, found), updated_report) = registered;
+            let (Solution { corrected, lidar_model: found, equations }, updated_report) = registered;
             (lidar_model, report) = (found, updated_report);
+            of_poses = self.covariances(&corrected, &equations, report)?;
             let next = trajectory_of(corrected, map_from_head.stamps(), report)?;
             let (shift_m, _) = largest_difference(&pre_aligned.trajectory, &next);
             let observed = pre_aligned.observed.along(&pre_aligned.trajectory, &next);
@@ -243,7 +289,7 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok((Registered { trajectory: pre_aligned.trajectory, lidar_model }, report))
+        Ok((Registered { trajectory: pre_aligned.trajectory, covariances: of_poses, lidar_model }, report))
     }
 }
 
@@ -254,6 +300,13 @@ fn trajectory_of(
     report: RegistrationReport,
 ) -> Result<Trajectory, Box<(RegistrationReport, &'static str)>> {
     corrected.into_trajectory(stamps).map_err(|_| Box::new((report, "the registered poses are not finite")))
+}
+
+/// The solution of a registration, with the equations of the last iteration.
+struct Solution {
+    corrected: CorrectedTrajectory,
+    lidar_model: LidarModel,
+    equations: Equations,
 }
 
 /// State of the iterations.
@@ -276,18 +329,21 @@ impl<'a> Registration<'a> {
         lidar_model: LidarModel,
         observed: &ObservedSurfels,
         report: RegistrationReport,
-    ) -> RegistrationResult<(CorrectedTrajectory, LidarModel)> {
+    ) -> RegistrationResult<Solution> {
         let (spec, matcher) = (problem.spec, problem.matcher);
         let scene = Scene::new(observed, &corrected, &lidar_model, spec);
         let mut registration = Self { spec, matcher, corrected, lidar_model, scene, weakest: Vector::z(), report };
         match registration.refine() {
-            Ok(()) => Ok(((registration.corrected, registration.lidar_model), registration.report)),
+            Ok(equations) => {
+                let Self { corrected, lidar_model, report, .. } = registration;
+                Ok((Solution { corrected, lidar_model, equations }, report))
+            }
             Err(why) => Err(Box::new((registration.report, why))),
         }
     }
 
-    /// Iterates from the coarsest resolution to the finest.
-    fn refine(&mut self) -> Result<(), &'static str> {
+    /// Iterates from the coarsest resolution to the finest; returns the equations of the last iteration.
+    fn refine(&mut self) -> Result<Equations, &'static str> {
         let (first_knot, knots) = self.corrected.knots();
         self.report.surfels = self.scene.patches.len();
         self.report.submaps = (self.scene.submaps.len(), self.scene.pairs.len());
@@ -307,7 +363,7 @@ impl<'a> Registration<'a> {
                     other => other.insert(self.empty_equations(&neighbours)),
                 };
                 let statistics = self.assemble(&neighbours, self.spec.max_plane_distance_m * coarser, equations);
-                let (x, step) = equations.solve().ok_or("the normal equations are singular")?;
+                let (x, step) = equations.solve().ok_or(SINGULAR)?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
                 let Displacement { translation_m, rotation_rad } = Displacement::max_of(knots);
@@ -327,7 +383,7 @@ impl<'a> Registration<'a> {
                 }
             }
         }
-        if self.report.matches == 0 { Err("no surface was observed twice") } else { Ok(()) }
+        equations.filter(|_| self.report.matches > 0).ok_or("no surface was observed twice")
     }
 
     fn describe(&mut self, statistics: &MatchStatistics) {
