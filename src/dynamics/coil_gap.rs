@@ -1,7 +1,7 @@
 //! The gap between the coils of a bent spring.
 
 use super::mounted_spring::MountedSpring;
-use crate::elasticity::{Deformation, ElasticityError};
+use crate::elasticity::ElasticityError;
 use crate::geometry::{Pose, Vector};
 
 /// The smallest gap between the coils of a spring at one time.
@@ -23,8 +23,7 @@ impl MountedSpring {
     pub fn coil_gap(&self, base_from_head: &Pose) -> Result<Option<CoilGap>, ElasticityError> {
         let Some(coil) = &self.coil else { return Ok(None) };
         let foot_from_top = self.ends.foot_from_top(base_from_head);
-        let deformation = Deformation::of(&foot_from_top);
-        let sections = self.spring.section_loads(&mut self.spring.state(), &foot_from_top, &deformation)?;
+        let sections = self.spring.section_loads(&mut self.spring.state(), &foot_from_top)?;
         let gap_m = sections.iter().map(|load| coil.inner_gap_m(load)).fold(f64::INFINITY, f64::min);
         let bend_rad = Vector::z().angle(&(foot_from_top.rotation * Vector::z()));
         Ok(Some(CoilGap { gap_m, bend_rad }))

@@ -247,8 +247,7 @@ impl CompliantMount<'_> {
 
     fn on_straight_spring(&self, law: &ForceLaw) -> Pose {
         let mounted = &law.springs[0];
-        let straight = Pose::translation(0.0, 0.0, mounted.spring.length_m());
-        mounted.ends.base_from_foot * straight * mounted.ends.head_from_top.inverse()
+        mounted.ends.base_from_foot * mounted.spring.base_from_top_at_rest() * mounted.ends.head_from_top.inverse()
     }
 
     /// The force law for given axial loads of the springs.

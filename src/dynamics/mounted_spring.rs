@@ -1,9 +1,7 @@
 //! A spring with mounting points and, optionally, wire mass.
 
 use super::forces::{EndFrames, Forces, MotionState, RelativePose};
-use crate::elasticity::{
-    Coil, Deformation, ElasticityError, Matrix6, Spring, SpringState, Vector6, blocks, split, stack,
-};
+use crate::elasticity::{Coil, ElasticityError, Matrix6, Spring, SpringState, Vector6, blocks, split, stack};
 use crate::geometry::{Matrix, Pose, Vector, skew};
 
 /// A spring and the frames of the mounting points.
@@ -87,7 +85,7 @@ impl MountedSpring {
         forces: &mut Forces,
     ) -> Result<(), ElasticityError> {
         let between = self.ends.at(now);
-        let on_top = self.spring.wrench(state, &between.foot_from_top, &between.deformation)?;
+        let on_top = self.spring.wrench(state, &between.foot_from_top)?;
         forces.wrench += between.to_centre(&on_top);
         forces.turn_rad = forces.turn_rad.max(between.turn_rad());
         if let Some(mass) = &self.mass {
@@ -132,8 +130,7 @@ impl MountedSpring {
     /// When a segmented spring has no equilibrium.
     pub fn load_n(&self, base_from_head: &Pose) -> Result<f64, ElasticityError> {
         let foot_from_top = self.ends.foot_from_top(base_from_head);
-        let deformation = Deformation::of(&foot_from_top);
-        let (force, _) = split(&self.spring.wrench(&mut self.spring.state(), &foot_from_top, &deformation)?);
+        let (force, _) = split(&self.spring.wrench(&mut self.spring.state(), &foot_from_top)?);
         Ok(force.dot(&foot_from_top.translation.vector.normalize()))
     }
 }

@@ -52,14 +52,17 @@ impl Chain {
         self.on_top
     }
 
-    pub(super) fn potential_j(&self, element: &Element) -> f64 {
-        let segments = self.nodes.windows(2).map(|ends| ends[0].inv_mul(&ends[1]));
-        segments.map(|one_from_next| element.potential_j(&Deformation::of(&one_from_next).coordinates)).sum()
+    pub(super) fn potential_j(&self, elements: &[Element]) -> f64 {
+        let energy = |(element, ends): (&Element, &[Pose])| {
+            element.potential_j(&Deformation::of(&ends[0].inv_mul(&ends[1])).coordinates)
+        };
+        elements.iter().zip(self.nodes.windows(2)).map(energy).sum()
     }
 
     /// The loads on the sections at the two ends of each element.
-    pub(super) fn section_loads(&self, element: &Element) -> Vec<SectionLoad> {
-        self.nodes.windows(2).flat_map(|ends| element.section_loads(&ends[0].inv_mul(&ends[1]))).collect()
+    pub(super) fn section_loads(&self, elements: &[Element]) -> Vec<SectionLoad> {
+        let loads = |(element, ends): (&Element, &[Pose])| element.section_loads(&ends[0].inv_mul(&ends[1]));
+        elements.iter().zip(self.nodes.windows(2)).flat_map(loads).collect()
     }
 
     /// Moves the inner nodes into equilibrium for a top at `base_from_top`.
@@ -67,36 +70,35 @@ impl Chain {
     /// Starts from the last solution, or, if that fails, from a circular arc.
     pub(super) fn find_equilibrium(
         &mut self,
-        element: &Element,
+        elements: &[Element],
         length_m: f64,
         base_from_top: &Pose,
-        deformation: &Deformation,
     ) -> Result<(), ElasticityError> {
         let segments = self.nodes.len() - 1;
         self.nodes[segments] = *base_from_top;
-        if self.converged && self.iterate(element, length_m).is_ok() {
+        if self.converged && self.iterate(elements, length_m).is_ok() {
             return Ok(());
         }
         self.matrix = None;
-        self.place_on_arc(&deformation.coordinates);
-        let result = self.iterate(element, length_m);
+        self.place_on_arc(&Deformation::of(base_from_top).coordinates);
+        let result = self.iterate(elements, length_m);
         self.converged = result.is_ok();
         result
     }
 
     /// Runs Newton's method for the inner nodes from the present positions.
-    fn iterate(&mut self, element: &Element, length_m: f64) -> Result<(), ElasticityError> {
-        let tolerance_n = TOLERANCE * element.stiffness().m33 * length_m;
-        let mut size_n = self.compute_residual(element, length_m);
+    fn iterate(&mut self, elements: &[Element], length_m: f64) -> Result<(), ElasticityError> {
+        let tolerance_n = TOLERANCE * elements[0].stiffness().m33 * length_m;
+        let mut size_n = self.compute_residual(elements, length_m);
         for _ in 0..MAX_ITERATIONS {
             if size_n <= tolerance_n {
                 return Ok(());
             }
             if self.matrix.is_none() {
-                self.matrix = Some(self.linearise(element)?);
+                self.matrix = Some(self.linearise(elements)?);
             }
             self.advance(length_m);
-            let before_n = std::mem::replace(&mut size_n, self.compute_residual(element, length_m));
+            let before_n = std::mem::replace(&mut size_n, self.compute_residual(elements, length_m));
             if size_n.is_nan() || size_n > 0.1 * before_n {
                 self.matrix = None;
             }
@@ -121,10 +123,9 @@ impl Chain {
     /// Computes the residuals of the inner nodes and returns the largest one as a force, N.
     ///
     /// A torque counts as torque over spring length.
-    fn compute_residual(&mut self, element: &Element, length_m: f64) -> f64 {
-        let segments = self.nodes.len() - 1;
+    fn compute_residual(&mut self, elements: &[Element], length_m: f64) -> f64 {
         self.residual.fill(Vector6::zeros());
-        for k in 0..segments {
+        for (k, element) in elements.iter().enumerate() {
             let below_from_above = self.nodes[k].inv_mul(&self.nodes[k + 1]);
             let wrench = element.wrench(&below_from_above);
             let reaction = Element::reaction(&below_from_above, &wrench);
@@ -146,10 +147,13 @@ impl Chain {
     }
 
     /// Computes and factorises the Newton matrix at the present nodes, from the base upwards.
-    fn linearise(&self, element: &Element) -> Result<Matrices, ElasticityError> {
+    fn linearise(&self, elements: &[Element]) -> Result<Matrices, ElasticityError> {
         let segments = self.nodes.len() - 1;
-        let tangents: Vec<Tangent> =
-            self.nodes.windows(2).map(|ends| Tangent::of(element, &ends[0], &ends[1])).collect();
+        let tangents: Vec<Tangent> = elements
+            .iter()
+            .zip(self.nodes.windows(2))
+            .map(|(element, ends)| Tangent::of(element, &ends[0], &ends[1]))
+            .collect();
         let mut matrix = Matrices { pivot: Vec::new(), below: Vec::new(), above: Vec::new() };
         for k in 1..segments {
             let (under, over) = (&tangents[k - 1], &tangents[k]);

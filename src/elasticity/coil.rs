@@ -18,9 +18,19 @@ impl Moduli {
     }
 }
 
+/// How the wire winds about the axis, which points from the foot to the top.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Winding {
+    /// Whether the wire winds like a left-handed screw.
+    pub left_handed: bool,
+    /// Angle at which the wire begins at the foot, from the spring frame's +x towards +y, rad.
+    pub start_rad: f64,
+}
+
 /// A helical spring of round wire.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coil {
+    winding: Winding,
     coil_diameter_m: f64,
     wire_diameter_m: f64,
     active_coils: f64,
@@ -29,7 +39,7 @@ pub struct Coil {
 }
 
 impl Coil {
-    /// Creates a coil with mean diameter `coil_diameter_m` and `active_coils` turns of wire.
+    /// Creates a coil with mean diameter `coil_diameter_m` and `active_coils` turns of wire, right-handed, which begin on +x.
     ///
     /// All numbers are finite and above zero.
     ///
@@ -43,7 +53,8 @@ impl Coil {
         free_length_m: f64,
         moduli: Moduli,
     ) -> Result<Self, ElasticityError> {
-        let coil = Self { coil_diameter_m, wire_diameter_m, active_coils, free_length_m, moduli };
+        let winding = Winding { left_handed: false, start_rad: 0.0 };
+        let coil = Self { winding, coil_diameter_m, wire_diameter_m, active_coils, free_length_m, moduli };
         let (poisson, index) = (moduli.poisson(), coil_diameter_m / wire_diameter_m);
         if !(poisson > -1.0 && poisson <= 0.5) {
             let (youngs_gpa, shear_gpa) = (moduli.youngs_pa * 1e-9, moduli.shear_pa * 1e-9);
@@ -62,6 +73,21 @@ impl Coil {
             });
         }
         Ok(coil)
+    }
+
+    /// The same coil with another winding.
+    pub fn wound(self, winding: Winding) -> Self {
+        Self { winding, ..self }
+    }
+
+    /// How the wire winds.
+    pub fn winding(&self) -> &Winding {
+        &self.winding
+    }
+
+    /// Length of the wire of one turn, without load, m.
+    pub fn wire_per_turn_m(&self) -> f64 {
+        (std::f64::consts::PI * self.coil_diameter_m).hypot(self.free_length_m / self.active_coils)
     }
 
     /// Mean diameter of the coil, m.

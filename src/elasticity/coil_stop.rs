@@ -90,7 +90,7 @@ impl Overlap {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Deformation, Moduli, SpringDesign};
+    use super::super::{Moduli, SpringDesign};
     use super::*;
     use crate::geometry::{Pose, Rotation, Vector};
     use approx::assert_relative_eq;
@@ -144,7 +144,7 @@ mod tests {
             let (coil, spring) = short_spring(segments);
             let force_n = |length_m: f64| {
                 let top = Pose::translation(0.0, 0.0, length_m);
-                spring.wrench(&mut spring.state(), &top, &Deformation::of(&top)).unwrap()[2]
+                spring.wrench(&mut spring.state(), &top).unwrap()[2]
             };
             let k = coil.axial_n_per_m();
             assert_relative_eq!(force_n(0.037), 0.009 * k, max_relative = 1e-9);
@@ -162,7 +162,7 @@ mod tests {
                 let turn = Rotation::from_scaled_axis(Vector::new(wave(0.7), wave(1.3), 0.5 * wave(0.4)));
                 let shift = Vector::new(0.01 * wave(0.9), 0.01 * wave(1.7), 0.036 + 0.01 * wave(0.23));
                 let top = Pose::from_parts(shift.into(), turn);
-                let wrench = spring.wrench(&mut state, &top, &Deformation::of(&top));
+                let wrench = spring.wrench(&mut state, &top);
                 assert!(wrench.is_ok_and(|wrench| wrench.iter().all(|x| x.is_finite())), "{segments} segments: {top}");
             }
         }

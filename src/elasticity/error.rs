@@ -96,6 +96,12 @@ pub enum ElasticityError {
         /// Length under the load, mm.
         length_mm: f64,
     },
+    /// The load is beyond the range of the model of the wire.
+    #[error("a load of {load_n:.2} N deforms the coils more than the model of the wire allows")]
+    NotAHelix {
+        /// Axial load, N.
+        load_n: f64,
+    },
     /// Several segments for a spring that is given by a stiffness matrix.
     #[error("a spring given by a stiffness matrix has one segment, not {segments}: only a coil can be divided")]
     CannotBeDivided {

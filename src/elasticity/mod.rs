@@ -5,7 +5,8 @@
 //! top. Both are columns of six in the axes of the base, translation first.
 //!
 //! - [`Coil`]: a helical spring as a column with axial, torsional, bending and shear rigidity.
-//! - [`loaded_stiffness`]: the effect of an axial load on the stiffness of such a column (Haringx).
+//! - [`loaded_stiffness`]: the effect of an axial load on the stiffness of such a column (Haringx), which heads use.
+//! - [`Spring::of_coil`]: the same coil as an elastic rod along its wire, with couplings; heads do not use it yet.
 //! - [`Deformation`]: the displacement of the top in corotational coordinates.
 //! - [`Spring`]: the force law for large rotations: one or several elements, each with a potential in those
 //!   coordinates, so that energy is conserved exactly; the nodes between elements are massless and in equilibrium. Coils that
@@ -18,7 +19,9 @@ mod coil_stop;
 mod deformation;
 mod element;
 mod error;
+mod guided;
 mod haringx;
+mod helix;
 mod material;
 mod section;
 mod six_vector;
@@ -26,13 +29,14 @@ mod spec;
 mod spring;
 
 pub use buckling::buckling_load_n;
-pub use coil::{Coil, Moduli};
+pub use coil::{Coil, Moduli, Winding};
 pub use deformation::{Deformation, blocks, split, stack};
 pub use element::Element;
 pub use error::ElasticityError;
+pub use guided::GuidedTop;
 pub use haringx::{Column, loaded_stiffness};
 pub use material::{Density, Material, Stress};
 pub use section::SectionLoad;
 pub use six_vector::{Matrix6, Vector6, conditioning};
-pub use spec::{EndsSpec, SpringDesign, SpringSpec, StiffnessRow};
+pub use spec::{EndsSpec, HandSpec, SpringDesign, SpringSpec, StiffnessRow};
 pub use spring::{MAX_SEGMENTS, Spring, SpringState};

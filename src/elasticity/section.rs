@@ -70,7 +70,7 @@ impl Coil {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Deformation, Moduli, SpringDesign};
+    use super::super::{Moduli, SpringDesign};
     use super::*;
     use crate::geometry::{Rotation, Vector};
     use approx::assert_relative_eq;
@@ -89,7 +89,7 @@ mod tests {
             let radius_m = 0.12 / phi;
             let chord = Vector::new(radius_m * (1.0 - f64::cos(phi)), 0.0, radius_m * f64::sin(phi));
             let top = Pose::from_parts(chord.into(), Rotation::from_scaled_axis(Vector::y() * phi));
-            let loads = spring.section_loads(&mut spring.state(), &top, &Deformation::of(&top)).unwrap();
+            let loads = spring.section_loads(&mut spring.state(), &top).unwrap();
             assert_eq!(loads.len(), 8);
             for load in &loads {
                 assert_relative_eq!(coil.inner_gap_m(load), (0.12 - 0.036 - 0.0125 * phi) / 12.0, epsilon = 1e-8);
@@ -106,7 +106,7 @@ mod tests {
         let moved = stiffness.try_inverse().unwrap() * Vector6::new(0.01, 0.0, 0.0, 0.0, 0.0, 0.0);
         let (shift, turn) = split(&moved);
         let top = Pose::from_parts((Vector::z() * 0.12 + shift).into(), Rotation::from_scaled_axis(turn));
-        let loads = spring.section_loads(&mut spring.state(), &top, &Deformation::of(&top)).unwrap();
+        let loads = spring.section_loads(&mut spring.state(), &top).unwrap();
         assert_relative_eq!(loads[0].bending_nm, 0.01 * 0.12, max_relative = 1e-3);
         assert_relative_eq!(loads[1].bending_nm, 0.01 * 0.06, max_relative = 1e-3);
         assert!(loads[3].bending_nm < 1e-6, "{loads:?}");

@@ -1,6 +1,6 @@
 //! Specs of springs.
 
-use super::{Coil, ElasticityError, Material, Matrix6, Spring};
+use super::{Coil, ElasticityError, Material, Matrix6, Spring, Winding};
 use crate::spec::{Kind, SpecError, checked};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,12 @@ pub enum SpringSpec {
         /// Ends of the spring, which are a part of its free length.
         #[serde(default)]
         ends: EndsSpec,
+        /// Hand of the helix; so far it counts in the couplings of `stiffness_at_top` only.
+        #[serde(default)]
+        hand: HandSpec,
+        /// Angle at which the wire begins at the foot, from the spring frame's +x towards +y, degrees; it counts as `hand` does.
+        #[serde(default, with = "checked::Finite")]
+        start_deg: f64,
         /// Material of the wire.
         material: Material,
     },
@@ -57,6 +63,17 @@ pub enum EndsSpec {
     Closed,
     /// Closed and ground ends: two inactive coils, two diameters of the wire.
     ClosedGround,
+}
+
+/// Hand of a helix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, schemars::JsonSchema, Serialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum HandSpec {
+    /// The wire rises like the thread of an ordinary screw.
+    #[default]
+    Right,
+    /// The wire rises like a left-handed thread.
+    Left,
 }
 
 impl EndsSpec {
@@ -146,11 +163,21 @@ impl SpringSpec {
     pub fn design(&self) -> Result<SpringDesign, ElasticityError> {
         match self {
             SpringSpec::Named(_) => self.resolved()?.design(),
-            SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, free_length_mm, ends, material } => {
+            SpringSpec::Coil {
+                coil_diameter_mm,
+                wire_diameter_mm,
+                active_coils,
+                free_length_mm,
+                ends,
+                hand,
+                start_deg,
+                material,
+            } => {
                 let (diameter_m, wire_m) = (coil_diameter_mm * 1e-3, wire_diameter_mm * 1e-3);
                 let active_m = free_length_mm * 1e-3 - ends.wire_diameters() * wire_m;
                 let coil = Coil::new(diameter_m, wire_m, *active_coils, active_m, material.moduli())?;
-                Ok(SpringDesign::Coil(coil))
+                let winding = Winding { left_handed: *hand == HandSpec::Left, start_rad: start_deg.to_radians() };
+                Ok(SpringDesign::Coil(coil.wound(winding)))
             }
             SpringSpec::Stiffness { length_mm, rows } => {
                 let at_top = Matrix6::from_fn(|row, column| rows[row].0[column]);

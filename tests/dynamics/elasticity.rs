@@ -1,8 +1,6 @@
 //! The spring's force law, compared with Haringx's theory and the elastica.
 use approx::assert_relative_eq;
-use zsim::elasticity::{
-    Coil, Column, Deformation, Matrix6, Moduli, Spring, SpringState, Vector6, loaded_stiffness, split, stack,
-};
+use zsim::elasticity::{Coil, Column, Matrix6, Moduli, Spring, SpringState, Vector6, loaded_stiffness, split, stack};
 use zsim::geometry::{Pose, Rotation, Vector, skew};
 
 const STEEL: Moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
@@ -13,7 +11,7 @@ fn moved(top: &Pose, d: &Vector6) -> Pose {
 }
 
 fn wrench(spring: &Spring, state: &mut SpringState, top: &Pose) -> Vector6 {
-    spring.wrench(state, top, &Deformation::of(top)).unwrap()
+    spring.wrench(state, top).unwrap()
 }
 
 /// Tangent stiffness: minus the derivative of the wrench by the top's displacement, by central differences.

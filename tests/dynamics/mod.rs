@@ -13,5 +13,6 @@ mod invalid;
 mod invariance;
 mod linkage;
 mod rest;
+mod rod;
 mod shipped;
 mod wire;

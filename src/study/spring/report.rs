@@ -6,7 +6,7 @@ use super::{DesignMetrics, Shake, closed_form, mode_name, simulated};
 use crate::dynamics::{
     AccelerationKind, ElementLoad, HeadModel, HeadSpec, LinkageSpec, MassLimit, Mode, ModeKind, Peak, stands_with_mass,
 };
-use crate::elasticity::{Coil, Matrix6, SpringDesign, buckling_load_n, loaded_stiffness};
+use crate::elasticity::{Coil, Matrix6, Spring, SpringDesign, buckling_load_n};
 use crate::geometry::{STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
 use crate::sensors::Lidar;
 use crate::spec::Source;
@@ -14,6 +14,9 @@ use crate::study::StudyError;
 use crate::study::coverage::{Coverage, CoveragePlan};
 use crate::study::gains::{AXES, axis_name};
 use serde::Serialize;
+
+/// Segments for the stiffness of a guided spring: the ends of a loaded helix bend it slightly.
+const GUIDED_SEGMENTS: usize = 4;
 
 /// Report on a spring under a head.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -61,7 +64,7 @@ pub struct CoilReport {
     /// Compressive load, N, negative for tension: that at rest, or for a head without a rest pose the component of its
     /// weight along the spring.
     pub load_n: f64,
-    /// Stiffness matrix of the top end with a clamped foot, under that load; x, y, z, rx, ry, rz; `None` if the spring is
+    /// Stiffness matrix of the top end, guided under that load, with a clamped foot; x, y, z, rx, ry, rz; `None` if the spring is
     /// beyond its limits.
     pub stiffness_at_top: Option<[[f64; 6]; 6]>,
     /// Buckling load with a guided top, N; `None` if the spring does not buckle or the load is a tension.
@@ -237,7 +240,7 @@ fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<
     let (radius_m, wire_m) = model.wire.map_or((f64::NAN, f64::NAN), |w| (w.coil_radius_m, w.diameter_m));
     let coils = coil.solid_length_m() / wire_m;
     let buckling = buckling_load_n(coil).filter(|_| load_n > 0.0);
-    let at_top = coil.under_load(load_n).and_then(|column| loaded_stiffness(&column)).ok();
+    let at_top = Spring::of_coil(coil, load_n, GUIDED_SEGMENTS).and_then(|spring| spring.guided(load_n)).ok();
     CoilReport {
         free_length_mm: (coil.free_length_m() + 2.0 * model.end_m) * 1e3,
         load_n,
@@ -245,7 +248,7 @@ fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<
         mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
         axial_n_per_m: coil.axial_n_per_m(),
         torsion_nm_per_rad: coil.torsion_nm_per_rad(),
-        stiffness_at_top: at_top.as_ref().map(rows),
+        stiffness_at_top: at_top.map(|top| rows(&top.stiffness)),
         buckling_load_n: buckling,
         buckling_margin: buckling.map(|buckling_n| buckling_n / load_n),
         gap_mm: open_m / coils * 1e3,

@@ -2,7 +2,7 @@
 
 use super::super::Shake;
 use super::limits::BuildLimitsSpec;
-use crate::elasticity::{EndsSpec, Material, SpringSpec};
+use crate::elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
 use crate::spec::checked;
 use crate::study::sweep::{GoalSpec, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
@@ -101,6 +101,8 @@ impl CoilDesign {
             active_coils: self.active_coils,
             free_length_mm: self.free_length_mm,
             ends: self.ends,
+            hand: HandSpec::default(),
+            start_deg: 0.0,
             material: self.material,
         }
     }
