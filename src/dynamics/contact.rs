@@ -4,7 +4,7 @@ use super::head::HeadModel;
 use crate::geometry::{Kinematics, Pose};
 use serde::{Deserialize, Serialize};
 
-/// The coils of a spring touched and stopped each other elastically.
+/// The coils of a spring touched and stopped each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CoilContact {
     /// Time of the first contact, s after the start.
@@ -64,8 +64,8 @@ impl CoilContact {
     pub fn warning(&self) -> String {
         format!(
             "warning: t = {:.2} s: the coils of the spring touch at a bend of {:.0} degrees (in contact for {:.2} s, overlap \
-             up to {:.2} mm); they stop each other by an approximate contact force, so the motion from there on is not that of a \
-             real spring: use a spring with larger gaps, an end stop, or less motion",
+             up to {:.2} mm); they stop each other by a contact softer than that of steel, so the motion from there on is \
+             approximate: use a spring with larger gaps, an end stop, or less motion",
             self.first_t_s, self.first_bend_deg, self.contact_s, -self.least_gap_mm
         )
     }

@@ -19,10 +19,9 @@ impl Engine {
     /// Creates the body at `world_from_head` with `twist`.
     ///
     /// The twist is the velocity of the centre of mass and the angular velocity, in the world.
-    pub fn new(body: &Body, world_from_head: &Pose, twist: &Vector6, step_s: f64) -> Self {
+    pub fn new(body: &Body, world_from_head: &Pose, twist: &Vector6) -> Self {
         let mut world = PhysicsWorld::new();
         world.gravity = Default::default();
-        world.integration_parameters.dt = step_s;
         world.integration_parameters.num_solver_iterations = 1;
         let inertia = rapier3d_f64::math::Matrix::from_cols(
             body.inertia_in_head.column(0).into_owned().into(),
@@ -43,9 +42,10 @@ impl Engine {
         Self { world, handle }
     }
 
-    /// Advances one step under a force and a torque about the centre of mass, in the world.
-    pub fn step(&mut self, wrench: &Vector6) {
+    /// Advances one step of `step_s` under a force and a torque about the centre of mass, in the world.
+    pub fn step(&mut self, wrench: &Vector6, step_s: f64) {
         let (force, torque) = split(wrench);
+        self.world.integration_parameters.dt = step_s;
         if let Some(body) = self.world.bodies.get_mut(self.handle) {
             body.reset_forces(false);
             body.reset_torques(false);

@@ -8,6 +8,7 @@ use super::joint::UniversalJoint;
 use super::mounted_spring::MountedSpring;
 use crate::elasticity::{ElasticityError, Matrix6, SpringState, Vector6, split, stack};
 use crate::geometry::{Kinematics, Pose, Vector};
+use std::f64::consts::PI;
 
 /// The force law of a linkage: the sum of the elements, modal damping, hand hold and end stop.
 ///
@@ -87,6 +88,15 @@ impl ForceLaw {
         Ok(forces)
     }
 
+    /// The wrench of the coils that touch.
+    ///
+    /// # Errors
+    /// When a segmented spring has no equilibrium.
+    pub fn contact(&self, state: &mut ForceLawState, now: &MotionState<'_>) -> Result<Vector6, ElasticityError> {
+        let springs = self.springs.iter().zip(&mut state.0);
+        springs.map(|(mounted, state)| mounted.contact(state, now)).sum()
+    }
+
     /// Adds modal damping and hand hold.
     fn add_damping_and_hold(&self, between: &RelativePose, now: &MotionState<'_>, forces: &mut Forces) {
         let rate = between.rate_by_twist();
@@ -139,17 +149,48 @@ impl ForceLaw {
     ///
     /// The Jacobian is the derivative by the head's twist about the centre of mass, in the axes of the base.
     pub fn rate_matrix(&self, base_from_head: &Pose, body: &Body) -> (Vector6, Matrix6) {
-        let now = MotionState {
-            base: &Kinematics::at_rest(Pose::identity()),
-            world_from_head: base_from_head,
-            twist: &Vector6::zeros(),
-            body,
-            hold: 0.0,
-            gravity_in_world: Vector::zeros(),
-        };
-        let between = self.reference.at(&now);
+        let between = at_rest(base_from_head, body, |now| self.reference.at(now));
         (between.deformation.coordinates, between.rate_by_twist())
     }
+
+    /// The sum of the contact stiffnesses of all springs by the head's twist, all coils touching; `None` without contact.
+    pub fn contact_stiffness(&self, base_from_head: &Pose, body: &Body) -> Option<Matrix6> {
+        let of = |mounted: &MountedSpring| at_rest(base_from_head, body, |now| mounted.contact_stiffness(now));
+        self.springs.iter().filter_map(of).reduce(|sum, stiffness| sum + stiffness)
+    }
+
+    /// Relaxation time of the contact, s: the damping over the stiffness of the contact; zero without contact.
+    ///
+    /// That of the spring with the longest one, for a clash along its axis with the inertia `mass` of the head.
+    pub fn contact_relaxation_s(&self, base_from_head: &Pose, body: &Body, mass: &Matrix6) -> f64 {
+        let of = |mounted: &MountedSpring| {
+            let mobility = at_rest(base_from_head, body, |now| mounted.axial_mobility_per_kg(now, mass))?;
+            let closed = mounted.spring.contact_stiffness()?.m33;
+            let omega = ((closed + mounted.spring.axial_n_per_m()) * mobility).sqrt();
+            Some(2.0 * damping_ratio(mounted.coil?.restitution()) * omega / (closed * mobility))
+        };
+        self.springs.iter().filter_map(of).fold(0.0, f64::max)
+    }
+}
+
+/// The damping ratio of a mass on a Kelvin-Voigt element for a coefficient of restitution.
+///
+/// A mass leaves the element with `e = exp(-pi zeta / sqrt(1 - zeta^2))` times the speed of its arrival.
+fn damping_ratio(restitution: f64) -> f64 {
+    let decrement = -restitution.max(1e-6).ln();
+    decrement / decrement.hypot(PI)
+}
+
+/// What `of` gives for a head and a base at rest.
+fn at_rest<T>(base_from_head: &Pose, body: &Body, of: impl FnOnce(&MotionState<'_>) -> T) -> T {
+    of(&MotionState {
+        base: &Kinematics::at_rest(Pose::identity()),
+        world_from_head: base_from_head,
+        twist: &Vector6::zeros(),
+        body,
+        hold: 0.0,
+        gravity_in_world: Vector::zeros(),
+    })
 }
 
 impl EndStop {

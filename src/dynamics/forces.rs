@@ -53,12 +53,23 @@ pub(super) struct Forces {
     pub inertia: Matrix6,
     /// Largest rotation between the two frames of the linkage's reference or of a spring, rad.
     pub turn_rad: f64,
+    /// The part of `wrench` by coils that touch.
+    pub contact: Vector6,
+    /// Largest overlap of the coils of a spring's segment, m; negative without contact.
+    pub overlap_m: f64,
 }
 
 impl Forces {
     /// Zero forces.
     pub fn none() -> Self {
-        Self { wrench: Vector6::zeros(), damping: Matrix6::zeros(), inertia: Matrix6::zeros(), turn_rad: 0.0 }
+        Self {
+            wrench: Vector6::zeros(),
+            damping: Matrix6::zeros(),
+            inertia: Matrix6::zeros(),
+            turn_rad: 0.0,
+            contact: Vector6::zeros(),
+            overlap_m: f64::NEG_INFINITY,
+        }
     }
 
     /// Adds a force that acts at the end of `lever`.

@@ -14,6 +14,7 @@ mod carrier;
 mod coil_gap;
 mod compliant;
 mod contact;
+mod contact_steps;
 mod cord;
 mod elements;
 mod engine;

@@ -86,12 +86,28 @@ impl MountedSpring {
     ) -> Result<(), ElasticityError> {
         let between = self.ends.at(now);
         let on_top = self.spring.wrench(state, &between.foot_from_top)?;
-        forces.wrench += between.to_centre(&on_top);
+        forces.wrench += between.to_centre(&on_top.open);
         forces.turn_rad = forces.turn_rad.max(between.turn_rad());
+        forces.overlap_m = forces.overlap_m.max(on_top.overlap_m);
+        if on_top.overlap_m > 0.0 {
+            let contact = between.to_centre(&on_top.contact);
+            forces.wrench += contact;
+            forces.contact += contact;
+        }
         if let Some(mass) = &self.mass {
             mass.add_forces(&self.ends, &between, now, forces);
         }
         Ok(())
+    }
+
+    /// The wrench of the coils that touch.
+    ///
+    /// # Errors
+    /// When a segmented spring has no equilibrium.
+    pub fn contact(&self, state: &mut SpringState, now: &MotionState<'_>) -> Result<Vector6, ElasticityError> {
+        let between = self.ends.at(now);
+        let on_top = self.spring.wrench(state, &between.foot_from_top)?;
+        Ok(between.to_centre(&on_top.contact))
     }
 
     /// The inertial force `-B^T M B_dot v` of the wire due to the change of the Jacobian B with the pose.
@@ -106,6 +122,18 @@ impl MountedSpring {
         let span_s = 1e-4;
         let change = (rate(&moved(span_s)) - rate(&moved(-span_s))) / (2.0 * span_s);
         -rate(now.world_from_head).tr_mul(&(mass.in_coordinates * (change * relative)))
+    }
+
+    /// The stiffness of the contact of all coils by the head's twist, with the head at a pose; `None` without contact.
+    pub fn contact_stiffness(&self, now: &MotionState<'_>) -> Option<Matrix6> {
+        let rate = self.ends.at(now).rate_by_twist();
+        Some(rate.tr_mul(&(self.spring.contact_stiffness()? * rate)))
+    }
+
+    /// Speed along the spring for a unit impulse along it on the head with the inertia `mass`, 1/kg.
+    pub fn axial_mobility_per_kg(&self, now: &MotionState<'_>, mass: &Matrix6) -> Option<f64> {
+        let along = self.ends.at(now).rate_by_twist().row(2).transpose();
+        Some(along.dot(&mass.cholesky()?.solve(&along)))
     }
 
     /// Elastic energy of the spring and gravitational energy of the wire, J.
@@ -130,7 +158,7 @@ impl MountedSpring {
     /// When a segmented spring has no equilibrium.
     pub fn load_n(&self, base_from_head: &Pose) -> Result<f64, ElasticityError> {
         let foot_from_top = self.ends.foot_from_top(base_from_head);
-        let (force, _) = split(&self.spring.wrench(&mut self.spring.state(), &foot_from_top)?);
+        let (force, _) = split(&self.spring.wrench(&mut self.spring.state(), &foot_from_top)?.total());
         Ok(force.dot(&foot_from_top.translation.vector.normalize()))
     }
 }

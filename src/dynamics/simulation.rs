@@ -3,15 +3,18 @@
 use super::actuated::Actuated;
 use super::body::Body;
 use super::compliant::CompliantLinkage;
+use super::contact_steps::ContactSteps;
 use super::engine::Engine;
 use super::error::DynamicsError;
-use super::force_law::ForceLawState;
+use super::force_law::{ForceLaw, ForceLawState};
 use super::forces::{Forces, MotionState};
 use super::head::{HeadModel, Linkage};
+use super::joint::UniversalJoint;
 use super::statics::Statics;
 use crate::elasticity::{Matrix6, Vector6, split, stack};
 use crate::geometry::{Kinematics, Pose, Rotation, Vector, gravity_in_world};
 use crate::motion::BaseMotion;
+use nalgebra::{Cholesky, U6};
 use std::f64::consts::TAU;
 
 /// The motion of head and base at one time.
@@ -37,6 +40,12 @@ pub struct HeadState {
 /// `q[n+1]` satisfies the constraint. The scheme is time-reversible, so without damping the energy has no drift. The
 /// output is for the head frame at the time of the pose: the velocity is interpolated from the mean velocities of the
 /// steps to third order in dt, the acceleration to second order.
+///
+/// While coils touch, a step is divided into parts. Their contact force acts in each part; the impulses of all other
+/// forces remain those of the whole step (impulse method, r-RESPA; Tuckerman, Berne and Martyna 1992). With shorter steps
+/// for all forces, each clash would change the energy: the energy that leapfrog conserves depends on the step, and the
+/// steps become shorter and longer again in different states. Within two steps of contact, the velocity is the mean of
+/// those before and after the impulse at the pose.
 ///
 /// The iterator ends after the first error.
 pub struct HeadSimulation<'a> {
@@ -93,10 +102,7 @@ impl Iterator for HeadSimulation<'_> {
             Mechanism::Failed => return None,
             Mechanism::Rigid { base_from_head } => Ok(base.of_frame(base_from_head)),
             Mechanism::Actuated(actuated) => Ok(actuated.head_kinematics(&base, t_s)),
-            Mechanism::Compliant(compliant) => {
-                let next_base = || self.motion.at(self.count as f64 * self.step_s).world_from_body;
-                compliant.advance(t_s, &base, self.motion.hold(t_s), &next_base)
-            }
+            Mechanism::Compliant(compliant) => compliant.advance(self.count - 1, &base, self.motion),
         };
         if head.is_err() {
             self.mechanism = Mechanism::Failed;
@@ -112,6 +118,7 @@ struct CompliantMotion<'a> {
     engine: Engine,
     state: ForceLawState,
     step_s: f64,
+    contact: ContactSteps,
     pose: Pose,
     /// Mean velocity of the head's origin and mean angular velocity over the last step, in the world.
     before: Vector6,
@@ -133,79 +140,153 @@ impl<'a> CompliantMotion<'a> {
             .map_err(|failure| DynamicsError::NoEquilibriumAtStart { reason: failure.to_string() })?;
         let head = base.of_frame(&rest);
         let centre = head.of_frame(&Pose::from_parts(body.centre_of_mass_in_head.into(), Rotation::identity()));
-        let engine = Engine::new(body, &head.world_from_body, &velocity_before(&centre, 0.5 * step_s), step_s);
+        let engine = Engine::new(body, &head.world_from_body, &velocity_before(&centre, 0.5 * step_s));
         Ok(Self {
             body,
             compliant,
             engine,
             state: compliant.law.state(),
             step_s,
+            contact: ContactSteps::new(body, compliant, step_s),
             pose: head.world_from_body,
             before: velocity_before(&head, 0.5 * step_s),
             earlier: velocity_before(&head, 1.5 * step_s),
         })
     }
 
-    /// Returns the head's motion at `t_s` and advances to the next step.
-    ///
-    /// `next_base` is the pose of the base at the next step.
-    fn advance(
-        &mut self,
-        t_s: f64,
-        base: &Kinematics,
-        hold: f64,
-        next_base: &dyn Fn() -> Pose,
-    ) -> Result<Kinematics, DynamicsError> {
-        let twist = self.engine.twist();
-        let gravity_in_world = gravity_in_world();
-        let now =
-            MotionState { base, world_from_head: &self.pose, twist: &twist, body: self.body, hold, gravity_in_world };
-        let forces = self.compliant.law.forces(&mut self.state, &now)?;
-        check_bounds(t_s, forces.turn_rad, &twist)?;
-        let rotation = self.pose.rotation.to_rotation_matrix().into_inner();
-        let mass = self.body.mass_matrix(&rotation);
-        let change = self.change_of_twist(&mass, &forces, &now, next_base).ok_or_else(|| DynamicsError::Diverged {
-            t_s,
-            what: "the matrix of mass and damping is singular".to_owned(),
-        })?;
-        self.engine.step(&(mass * change / self.step_s));
-        let next = self.engine.pose();
-        let after = velocity_between(&self.pose, &next, self.step_s);
-        let head = kinematics(&self.pose, [&self.earlier, &self.before, &after], self.step_s);
-        self.pose = next;
+    /// Returns the head's motion at step `count` and advances to the next step.
+    fn advance(&mut self, count: u64, base: &Kinematics, motion: &dyn BaseMotion) -> Result<Kinematics, DynamicsError> {
+        let (start, twist, step_s) = (self.pose, self.engine.twist(), self.step_s);
+        let (start_s, end_s) = (count as f64 * step_s, (count + 1) as f64 * step_s);
+        let mut part = Part { motion, base: *base, start_s, end_s, length_s: step_s };
+        let forces = self.compliant.law.forces(&mut self.state, &part.state(&start, &twist, self.body))?;
+        check_bounds(start_s, forces.turn_rad, &twist)?;
+        let parts = self.contact.count_parts(forces.overlap_m);
+        let length_s = step_s / f64::from(parts);
+        let end_of = |k: u32| if k == parts { end_s } else { start_s + f64::from(k) * length_s };
+        (part.length_s, part.end_s) = (length_s, end_of(1));
+        let change = self.change_of_twist(&forces, &part)?;
+        self.drift(&change, length_s);
+        for k in 2..=parts {
+            part = part.next(end_of(k));
+            let change = self.change_by_contact(&forces.inertia, &part)?;
+            self.drift(&change, length_s);
+        }
+        let after = velocity_between(&start, &self.pose, step_s);
+        let mut head = kinematics(&start, [&self.earlier, &self.before, &after], step_s);
+        if self.contact.are_short() {
+            self.set_velocity(&mut head, &(twist + change * 0.5));
+        }
         self.earlier = std::mem::replace(&mut self.before, after);
         Ok(head)
     }
 
-    /// The change of the twist over the step.
+    /// Changes the twist and moves the head with the new one.
+    fn drift(&mut self, change: &Vector6, length_s: f64) {
+        self.engine.step(&(self.mass() * change / length_s), length_s);
+        self.pose = self.engine.pose();
+    }
+
+    /// The mass matrix at the present pose, in the axes of the world.
+    fn mass(&self) -> Matrix6 {
+        self.body.mass_matrix(&self.pose.rotation.to_rotation_matrix().into_inner())
+    }
+
+    /// The change of the twist at the start of a step, whose first part is `part`.
     ///
     /// Damping and gyroscopic torque are evaluated at the mean of the old and the new twist.
-    fn change_of_twist(
-        &self,
-        mass: &Matrix6,
-        forces: &Forces,
-        now: &MotionState<'_>,
-        next_base: &dyn Fn() -> Pose,
-    ) -> Option<Vector6> {
+    fn change_of_twist(&mut self, forces: &Forces, part: &Part<'_>) -> Result<Vector6, DynamicsError> {
         let law = &self.compliant.law;
+        let joint = part.joint(law);
+        let twist = self.engine.twist();
+        let now = part.state(&self.pose, &twist, self.body);
+        let mass = self.mass();
         let weight = stack(&(now.gravity_in_world * self.body.mass_kg), &Vector::zeros());
-        let implicit = (mass + forces.inertia + forces.damping * (0.5 * self.step_s)).cholesky()?;
+        let implicit = mass + forces.inertia + forces.damping * (0.5 * self.step_s);
+        let implicit = implicit.cholesky().ok_or_else(|| part.singular())?;
         let inertia = mass.fixed_view::<3, 3>(3, 3);
-        let joint = law.joint.as_ref().map(|joint| (joint, next_base()));
+        let contact = self.contact.impulse(&forces.contact, part.length_s);
+        let other = forces.wrench - forces.contact;
         let mut change = Vector6::zeros();
         // Fixed-point iteration: each pass changes the gyroscopic torque by at most 1 %.
         for _ in 0..3 {
             let mean = now.twist + change * 0.5;
             let (_, turning) = split(&mean);
             let gyroscopic = stack(&Vector::zeros(), &-turning.cross(&(inertia * turning)));
-            let push = forces.wrench + weight + gyroscopic + law.quadratic_forces(now, &mean);
-            change = implicit.solve(&(push * self.step_s));
-            if let Some((joint, next_base)) = &joint {
-                change = joint
-                    .constrained_change(now, next_base, self.step_s, &change, |wrenches| implicit.solve(wrenches))?;
+            let push = other + weight + gyroscopic + law.quadratic_forces(&now, &mean);
+            change = implicit.solve(&(push * self.step_s + contact));
+            if let Some(joint) = &joint {
+                change = part.constrained(joint, &now, &change, &implicit)?;
             }
         }
-        Some(change)
+        Ok(change)
+    }
+
+    /// The change of the twist by the contact at the start of a part within a step.
+    fn change_by_contact(&mut self, inertia: &Matrix6, part: &Part<'_>) -> Result<Vector6, DynamicsError> {
+        let twist = self.engine.twist();
+        let now = part.state(&self.pose, &twist, self.body);
+        let contact = self.compliant.law.contact(&mut self.state, &now)?;
+        let factor = (self.mass() + inertia).cholesky().ok_or_else(|| part.singular())?;
+        let change = factor.solve(&self.contact.impulse(&contact, part.length_s));
+        match part.joint(&self.compliant.law) {
+            None => Ok(change),
+            Some(joint) => part.constrained(&joint, &now, &change, &factor),
+        }
+    }
+
+    /// Sets the velocities of the head frame to those of `twist`, that of the centre of mass.
+    fn set_velocity(&self, head: &mut Kinematics, twist: &Vector6) {
+        let (velocity, turning) = split(twist);
+        let arm = head.world_from_body.rotation * self.body.centre_of_mass_in_head;
+        head.velocity_in_world = velocity - turning.cross(&arm);
+        head.angular_velocity_in_world = turning;
+    }
+}
+
+/// A time step, or a part of it.
+struct Part<'a> {
+    motion: &'a dyn BaseMotion,
+    /// Motion of the base at the start.
+    base: Kinematics,
+    start_s: f64,
+    end_s: f64,
+    length_s: f64,
+}
+
+impl Part<'_> {
+    /// The next part, up to `end_s`.
+    fn next(self, end_s: f64) -> Self {
+        Self { base: self.motion.at(self.end_s), start_s: self.end_s, end_s, ..self }
+    }
+
+    /// The state at the start, with a head at `world_from_head`.
+    fn state<'b>(&'b self, world_from_head: &'b Pose, twist: &'b Vector6, body: &'b Body) -> MotionState<'b> {
+        let (hold, gravity_in_world) = (self.motion.hold(self.start_s), gravity_in_world());
+        MotionState { base: &self.base, world_from_head, twist, body, hold, gravity_in_world }
+    }
+
+    /// The joint of a linkage and the pose of the base at the end; `None` without a joint.
+    fn joint<'b>(&self, law: &'b ForceLaw) -> Option<(&'b UniversalJoint, Pose)> {
+        law.joint.as_ref().map(|joint| (joint, self.motion.at(self.end_s).world_from_body))
+    }
+
+    /// The change of the twist with the constraint wrench of the joint.
+    fn constrained(
+        &self,
+        (joint, next_base): &(&UniversalJoint, Pose),
+        now: &MotionState<'_>,
+        change: &Vector6,
+        inertia: &Cholesky<f64, U6>,
+    ) -> Result<Vector6, DynamicsError> {
+        joint
+            .constrained_change(now, next_base, self.length_s, change, |wrenches| inertia.solve(wrenches))
+            .ok_or_else(|| self.singular())
+    }
+
+    fn singular(&self) -> DynamicsError {
+        let what = "the matrix of mass and damping is singular".to_owned();
+        DynamicsError::Diverged { t_s: self.start_s, what }
     }
 }
 

@@ -59,6 +59,14 @@ impl Chain {
         elements.iter().zip(self.nodes.windows(2)).map(energy).sum()
     }
 
+    /// The largest overlap of the coils of an element, m; negative without contact.
+    pub(super) fn overlap_m(&self, elements: &[Element]) -> f64 {
+        let overlap = |(element, ends): (&Element, &[Pose])| {
+            element.overlap_m(&Deformation::of(&ends[0].inv_mul(&ends[1])).coordinates)
+        };
+        elements.iter().zip(self.nodes.windows(2)).map(overlap).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The loads on the sections at the two ends of each element.
     pub(super) fn section_loads(&self, elements: &[Element]) -> Vec<SectionLoad> {
         let loads = |(element, ends): (&Element, &[Pose])| element.section_loads(&ends[0].inv_mul(&ends[1]));

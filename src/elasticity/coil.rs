@@ -36,6 +36,7 @@ pub struct Coil {
     active_coils: f64,
     free_length_m: f64,
     moduli: Moduli,
+    restitution: f64,
 }
 
 impl Coil {
@@ -54,7 +55,8 @@ impl Coil {
         moduli: Moduli,
     ) -> Result<Self, ElasticityError> {
         let winding = Winding { left_handed: false, start_rad: 0.0 };
-        let coil = Self { winding, coil_diameter_m, wire_diameter_m, active_coils, free_length_m, moduli };
+        let restitution = 1.0;
+        let coil = Self { winding, coil_diameter_m, wire_diameter_m, active_coils, free_length_m, moduli, restitution };
         let (poisson, index) = (moduli.poisson(), coil_diameter_m / wire_diameter_m);
         if !(poisson > -1.0 && poisson <= 0.5) {
             let (youngs_gpa, shear_gpa) = (moduli.youngs_pa * 1e-9, moduli.shear_pa * 1e-9);
@@ -73,6 +75,16 @@ impl Coil {
             });
         }
         Ok(coil)
+    }
+
+    /// The same coil with a coefficient of restitution of its coils, 0 to 1; that of a new coil is 1.
+    pub fn with_restitution(self, restitution: f64) -> Self {
+        Self { restitution, ..self }
+    }
+
+    /// Coefficient of restitution of coils that touch.
+    pub fn restitution(&self) -> f64 {
+        self.restitution
     }
 
     /// The same coil with another winding.

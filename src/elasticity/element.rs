@@ -62,6 +62,16 @@ impl Element {
         Self { stop: Some(stop), ..self }
     }
 
+    /// The overlap of the coils at the inner side of the bend, m: negative without contact, minus infinity for a stiffness.
+    pub(super) fn overlap_m(&self, coordinates: &Vector6) -> f64 {
+        self.stop.map_or(f64::NEG_INFINITY, |stop| stop.overlap_m(&(coordinates - self.rest)))
+    }
+
+    /// The stiffness of the contact when all coils touch, in the coordinates.
+    pub(super) fn closed_stiffness(&self) -> Option<Matrix6> {
+        self.stop.map(|stop| stop.closed_stiffness())
+    }
+
     /// The coordinates of the straight, loaded segment.
     pub fn rest(&self) -> &Vector6 {
         &self.rest

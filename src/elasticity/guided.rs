@@ -30,7 +30,7 @@ impl Spring {
         let mut top = Pose::translation(0.0, 0.0, self.length_m());
         for _ in 0..MAX_ITERATIONS {
             let stiffness = self.tangent(&mut state, &top)?;
-            let wrench = self.wrench(&mut state, &top)?;
+            let wrench = self.wrench(&mut state, &top)?.total();
             let free = Matrix2::new(stiffness.m33, stiffness.m36, stiffness.m63, stiffness.m66);
             let unbalanced = Vector2::new(wrench[2] - load_n, wrench[5]);
             let step = free.lu().solve(&unbalanced).ok_or(ElasticityError::NotAHelix { load_n })?;
@@ -47,7 +47,7 @@ impl Spring {
         let mut tangent = Matrix6::zeros();
         for k in 0..6 {
             let d = Vector6::ith(k, DIFFERENCE);
-            let change = self.wrench(state, &moved(top, &-d))? - self.wrench(state, &moved(top, &d))?;
+            let change = self.wrench(state, &moved(top, &-d))?.total() - self.wrench(state, &moved(top, &d))?.total();
             tangent.set_column(k, &(change / (2.0 * DIFFERENCE)));
         }
         Ok(tangent)

@@ -39,4 +39,4 @@ pub use material::{Density, Material, Stress};
 pub use section::SectionLoad;
 pub use six_vector::{Matrix6, Vector6, conditioning};
 pub use spec::{EndsSpec, HandSpec, SpringDesign, SpringSpec, StiffnessRow};
-pub use spring::{MAX_SEGMENTS, Spring, SpringState};
+pub use spring::{MAX_SEGMENTS, Spring, SpringState, SpringWrench};

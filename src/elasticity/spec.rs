@@ -35,6 +35,11 @@ pub enum SpringSpec {
         start_deg: f64,
         /// Material of the wire.
         material: Material,
+        /// Coefficient of restitution of the coils: speed of a head after a clash along the spring over that before it, for a contact
+        /// force well above that of the open spring; 1: elastic.
+        #[serde(default = "elastic", skip_serializing_if = "is_elastic", with = "checked::Fraction")]
+        #[schemars(extend("default" = 1.0))]
+        coil_restitution: f64,
     },
     /// A spring given by the stiffness of the top under the head's weight, with the base clamped.
     ///
@@ -116,6 +121,15 @@ pub enum SpringDesign {
     },
 }
 
+/// The coefficient of restitution of an elastic clash.
+fn elastic() -> f64 {
+    1.0
+}
+
+fn is_elastic(restitution: &f64) -> bool {
+    *restitution == 1.0
+}
+
 impl SpringSpec {
     /// The spec itself, or the one that it names.
     ///
@@ -172,12 +186,13 @@ impl SpringSpec {
                 hand,
                 start_deg,
                 material,
+                coil_restitution,
             } => {
                 let (diameter_m, wire_m) = (coil_diameter_mm * 1e-3, wire_diameter_mm * 1e-3);
                 let active_m = free_length_mm * 1e-3 - ends.wire_diameters() * wire_m;
                 let coil = Coil::new(diameter_m, wire_m, *active_coils, active_m, material.moduli())?;
                 let winding = Winding { left_handed: *hand == HandSpec::Left, start_rad: start_deg.to_radians() };
-                Ok(SpringDesign::Coil(coil.wound(winding)))
+                Ok(SpringDesign::Coil(coil.wound(winding).with_restitution(*coil_restitution)))
             }
             SpringSpec::Stiffness { length_mm, rows } => {
                 let at_top = Matrix6::from_fn(|row, column| rows[row].0[column]);

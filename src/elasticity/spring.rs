@@ -16,6 +16,9 @@ pub const MAX_SEGMENTS: usize = 64;
 /// starting from the last solution in [`SpringState`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spring {
+    /// The elements without contact of their coils.
+    open: Vec<Element>,
+    /// The elements with contact of their coils; equal to `open` for a spring given by a stiffness.
     elements: Vec<Element>,
     length_m: f64,
     /// The ends of the elements are on the axis of the loaded helix, which leans against the clamped ends of the wire.
@@ -23,10 +26,50 @@ pub struct Spring {
     axis_from_top: Pose,
 }
 
+/// The wrench of a spring on the body at its top, in the axes of the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpringWrench {
+    /// The wrench of the spring if its coils could pass through each other.
+    pub open: Vector6,
+    /// What the contact of the coils adds to it; zero if none touch.
+    pub contact: Vector6,
+    /// The largest overlap of the coils of a segment, m; negative without contact.
+    pub overlap_m: f64,
+}
+
 /// The last solution for the inner nodes of a spring.
 #[derive(Debug, Clone)]
 pub struct SpringState {
-    chain: Option<Chain>,
+    chains: Option<Chains>,
+}
+
+/// The inner nodes of a segmented spring.
+#[derive(Debug, Clone)]
+struct Chains {
+    /// Those of a spring whose coils could pass through each other.
+    open: Chain,
+    /// Those with contact; `None` if no coils touch.
+    touching: Option<Chain>,
+}
+
+impl Chains {
+    /// Moves the inner nodes into equilibrium and returns the largest overlap of the coils of a segment, m.
+    fn find_equilibrium(&mut self, spring: &Spring, ends: &Pose) -> Result<f64, ElasticityError> {
+        self.open.find_equilibrium(&spring.open, spring.length_m, ends)?;
+        let overlap_m = self.open.overlap_m(&spring.elements);
+        if overlap_m <= 0.0 {
+            self.touching = None;
+        } else {
+            let touching = self.touching.get_or_insert_with(|| self.open.clone());
+            touching.find_equilibrium(&spring.elements, spring.length_m, ends)?;
+        }
+        Ok(overlap_m)
+    }
+
+    /// The nodes, with contact if coils touch.
+    fn nodes(&self) -> &Chain {
+        self.touching.as_ref().unwrap_or(&self.open)
+    }
 }
 
 impl Spring {
@@ -45,6 +88,7 @@ impl Spring {
             too_few_segments(load_n, segments, |count| elements_of(&helix, load_n, count).is_ok()).unwrap_or(error)
         })?;
         Ok(Self {
+            open: elements.clone(),
             elements,
             length_m: helix.length_m(),
             base_from_axis: helix.foot_from_axis(),
@@ -67,13 +111,14 @@ impl Spring {
             too_few_segments(column.load_n, segments, |count| element_of(count).is_ok()).unwrap_or(error)
         })?;
         let (base_from_axis, axis_from_top) = (Pose::identity(), Pose::identity());
-        Ok(Self { elements: vec![element; segments], length_m: column.length_m, base_from_axis, axis_from_top })
+        let elements = vec![element; segments];
+        Ok(Self { open: elements.clone(), elements, length_m: column.length_m, base_from_axis, axis_from_top })
     }
 
     /// The same spring, whose coils stop each other where they touch; it was created from `coil` under `load_n`.
     pub fn with_contact(self, coil: &Coil, load_n: f64) -> Self {
-        let stop = CoilStop::new(coil, load_n, self.segments(), self.elements[0].stiffness().m33);
-        Self { elements: self.elements.into_iter().map(|element| element.with_stop(stop)).collect(), ..self }
+        let stop = CoilStop::new(coil, load_n, self.segments(), self.open[0].stiffness().m33);
+        Self { elements: self.open.iter().map(|element| element.with_stop(stop)).collect(), ..self }
     }
 
     /// Creates a single element of length `length_m` under `load_n` with the stiffness `at_top` when straight.
@@ -84,7 +129,17 @@ impl Spring {
         let element = Element::new(length_m, load_n, at_top)?;
         super::element::check_positive_definite(at_top)?;
         let (base_from_axis, axis_from_top) = (Pose::identity(), Pose::identity());
-        Ok(Self { elements: vec![element], length_m, base_from_axis, axis_from_top })
+        Ok(Self { open: vec![element], elements: vec![element], length_m, base_from_axis, axis_from_top })
+    }
+
+    /// The stiffness of the contact when all coils touch, in the coordinates of the spring; `None` without contact.
+    pub fn contact_stiffness(&self) -> Option<Matrix6> {
+        Some(self.elements[0].closed_stiffness()? / self.segments() as f64)
+    }
+
+    /// Axial stiffness of the straight, loaded spring without contact, N/m.
+    pub fn axial_n_per_m(&self) -> f64 {
+        self.open[0].stiffness().m33 / self.segments() as f64
     }
 
     /// Length of the loaded spring along its axis, m.
@@ -104,7 +159,8 @@ impl Spring {
 
     /// A state without a solution for the inner nodes.
     pub fn state(&self) -> SpringState {
-        SpringState { chain: (self.segments() > 1).then(|| Chain::new(self.segments())) }
+        let chains = || Chains { open: Chain::new(self.segments()), touching: None };
+        SpringState { chains: (self.segments() > 1).then(chains) }
     }
 
     /// The upper end of the elements relative to the lower one.
@@ -116,20 +172,27 @@ impl Spring {
     ///
     /// # Errors
     /// When the equilibrium of the inner nodes does not converge.
-    pub fn wrench(&self, state: &mut SpringState, base_from_top: &Pose) -> Result<Vector6, ElasticityError> {
+    pub fn wrench(&self, state: &mut SpringState, base_from_top: &Pose) -> Result<SpringWrench, ElasticityError> {
         let ends = self.between_ends(base_from_top);
-        let on_axis = match &mut state.chain {
-            None => self.elements[0].wrench(&ends),
-            Some(chain) => {
-                chain.find_equilibrium(&self.elements, self.length_m, &ends)?;
-                chain.wrench_on_top()
-            }
+        let Some(chains) = &mut state.chains else {
+            let deformation = Deformation::of(&ends);
+            let on_top = |element: &Element| {
+                self.about_top(&ends, &-deformation.wrench(&element.gradient(&deformation.coordinates)))
+            };
+            let overlap_m = self.elements[0].overlap_m(&deformation.coordinates);
+            return Ok(SpringWrench::new(on_top(&self.open[0]), overlap_m, || on_top(&self.elements[0])));
         };
-        let (force, torque) = split(&on_axis);
+        let overlap_m = chains.find_equilibrium(self, &ends)?;
+        let on_top = |chain: &Chain| self.about_top(&ends, &chain.wrench_on_top());
+        Ok(SpringWrench::new(on_top(&chains.open), overlap_m, || on_top(chains.nodes())))
+    }
+
+    /// A wrench about the upper end of the elements, as one about the top.
+    fn about_top(&self, ends: &Pose, wrench: &Vector6) -> Vector6 {
+        let (force, torque) = split(wrench);
         let lever = ends.rotation * self.axis_from_top.translation.vector;
-        let torque = torque - lever.cross(&force);
         let axes = self.base_from_axis.rotation;
-        Ok(stack(&(axes * force), &(axes * torque)))
+        stack(&(axes * force), &(axes * (torque - lever.cross(&force))))
     }
 
     /// The loads on the sections at the two ends of each segment, from the foot to the top.
@@ -142,11 +205,11 @@ impl Spring {
         base_from_top: &Pose,
     ) -> Result<Vec<SectionLoad>, ElasticityError> {
         let ends = self.between_ends(base_from_top);
-        match &mut state.chain {
+        match &mut state.chains {
             None => Ok(self.elements[0].section_loads(&ends).to_vec()),
-            Some(chain) => {
-                chain.find_equilibrium(&self.elements, self.length_m, &ends)?;
-                Ok(chain.section_loads(&self.elements))
+            Some(chains) => {
+                chains.find_equilibrium(self, &ends)?;
+                Ok(chains.nodes().section_loads(&self.elements))
             }
         }
     }
@@ -157,13 +220,26 @@ impl Spring {
     /// When the equilibrium of the inner nodes does not converge.
     pub fn potential_j(&self, state: &mut SpringState, base_from_top: &Pose) -> Result<f64, ElasticityError> {
         let ends = self.between_ends(base_from_top);
-        match &mut state.chain {
+        match &mut state.chains {
             None => Ok(self.elements[0].potential_j(&Deformation::of(&ends).coordinates)),
-            Some(chain) => {
-                chain.find_equilibrium(&self.elements, self.length_m, &ends)?;
-                Ok(chain.potential_j(&self.elements))
+            Some(chains) => {
+                chains.find_equilibrium(self, &ends)?;
+                Ok(chains.nodes().potential_j(&self.elements))
             }
         }
+    }
+}
+
+impl SpringWrench {
+    /// The wrench without contact, and that with it if coils touch.
+    fn new(open: Vector6, overlap_m: f64, touching: impl FnOnce() -> Vector6) -> Self {
+        let contact = if overlap_m > 0.0 { touching() - open } else { Vector6::zeros() };
+        Self { open, contact, overlap_m }
+    }
+
+    /// The sum of both parts.
+    pub fn total(&self) -> Vector6 {
+        self.open + self.contact
     }
 }
 

@@ -11,7 +11,7 @@ fn moved(top: &Pose, d: &Vector6) -> Pose {
 }
 
 fn wrench(spring: &Spring, state: &mut SpringState, top: &Pose) -> Vector6 {
-    spring.wrench(state, top).unwrap()
+    spring.wrench(state, top).unwrap().total()
 }
 
 /// Tangent stiffness: minus the derivative of the wrench by the top's displacement, by central differences.

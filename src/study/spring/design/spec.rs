@@ -104,6 +104,7 @@ impl CoilDesign {
             hand: HandSpec::default(),
             start_deg: 0.0,
             material: self.material,
+            coil_restitution: 1.0,
         }
     }
 }
