@@ -2,11 +2,13 @@
 
 use super::deformation::split;
 use super::{ElasticityError, Matrix6, Spring, SpringState, Vector6};
-use crate::geometry::{Pose, Rotation};
+use crate::geometry::{Pose, Rotation, Vector};
 use nalgebra::{Matrix2, Vector2};
 
 /// Maximum Newton iterations.
 const MAX_ITERATIONS: usize = 50;
+/// Steps from the top of the leaning helix to the guided top: inner nodes follow from step to step.
+const GUIDING_STEPS: u32 = 8;
 /// Step of the central differences, m and rad.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -27,7 +29,11 @@ impl Spring {
     /// When the spring finds no equilibrium under the load.
     pub fn guided(&self, load_n: f64) -> Result<GuidedTop, ElasticityError> {
         let mut state = self.state();
-        let mut top = Pose::translation(0.0, 0.0, self.length_m());
+        let mut top = self.base_from_top_at_rest();
+        for left in (0..GUIDING_STEPS).rev() {
+            top = less_leaned(&top, f64::from(left) / f64::from(left + 1));
+            self.wrench(&mut state, &top)?;
+        }
         for _ in 0..MAX_ITERATIONS {
             let stiffness = self.tangent(&mut state, &top)?;
             let wrench = self.wrench(&mut state, &top)?.total();
@@ -52,6 +58,13 @@ impl Spring {
         }
         Ok(tangent)
     }
+}
+
+/// A top with `factor` times the tilt and the sideways shift.
+fn less_leaned(top: &Pose, factor: f64) -> Pose {
+    let (shift, turn) = (top.translation.vector, top.rotation.scaled_axis());
+    let less = |v: Vector| Vector::new(v.x * factor, v.y * factor, v.z);
+    Pose::from_parts(less(shift).into(), Rotation::from_scaled_axis(less(turn)))
 }
 
 fn moved(top: &Pose, by: &Vector6) -> Pose {

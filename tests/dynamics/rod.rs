@@ -4,8 +4,10 @@
 //! no sideways motion, free to turn about the axis) under the axial load. Nothing is linearised.
 
 use nalgebra::{SMatrix, SVector};
+use rand::RngExt;
 use zsim::elasticity::{Coil, GuidedTop, Matrix6, Moduli, Spring, Vector6, Winding, buckling_load_n, split, stack};
 use zsim::geometry::{Matrix, Pose, Rotation, Vector, skew};
+use zsim::random::Seed;
 
 const STEEL: Moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
 /// Steps by coil; twice as many change the stiffness by less than 1e-4.
@@ -132,8 +134,11 @@ impl Rod {
     }
 }
 
-/// Coil and wire diameter, coils, free length (mm), share of the buckling load (or of the load to the solid length), segments.
-type Case = ([f64; 4], f64, usize);
+/// Coil and wire diameter, coils, free length (mm), and share of the buckling load; without one, of 60 % of the load that closes
+/// the coils.
+type Case = ([f64; 4], f64);
+/// As `zsim spring` has them. With four, short springs near buckling err by up to 8 %, with eight by 6 %.
+const SEGMENTS: usize = 16;
 
 fn largest_error_of(found: &Matrix6, expected: &Matrix6) -> (f64, (usize, usize)) {
     let mut worst = (0.0, (0, 0));
@@ -153,13 +158,13 @@ fn largest_error_of(found: &Matrix6, expected: &Matrix6) -> (f64, (usize, usize)
 }
 
 fn largest_error(case: &Case, winding: Winding) -> (f64, (usize, usize)) {
-    let ([coil_mm, wire_mm, coils, length_mm], share, segments) = *case;
+    let ([coil_mm, wire_mm, coils, length_mm], share) = *case;
     let coil = Coil::new(coil_mm * 1e-3, wire_mm * 1e-3, coils, length_mm * 1e-3, STEEL).unwrap().wound(winding);
     let solid_n = (coil.free_length_m() - coil.solid_length_m()) * coil.axial_n_per_m();
     let load_n = share * buckling_load_n(&coil).unwrap_or(solid_n * 0.6);
     let (expected, pose) = Rod::new(&coil).guided(load_n);
     let GuidedTop { stiffness: found, base_from_top: top } =
-        Spring::of_coil(&coil, load_n, segments).unwrap().guided(load_n).unwrap();
+        Spring::of_coil(&coil, load_n, SEGMENTS).unwrap().guided(load_n).unwrap();
     assert!((top.translation.z - pose.translation.z).abs() < 2e-3 * coil.free_length_m(), "{case:?} {top} {pose}");
     assert!(top.rotation.angle_to(&pose.rotation) < 2e-3, "{case:?} {top} {pose}");
     largest_error_of(&found, &expected)
@@ -167,31 +172,51 @@ fn largest_error(case: &Case, winding: Winding) -> (f64, (usize, usize)) {
 
 #[test]
 fn stiffness_and_couplings_are_those_of_an_exact_rod() {
-    // Index 4 to 20, pitch 3 to 15 degrees, whole and broken numbers of coils, up to 80 % of the buckling load.
+    // At most 1.1 %.
     let cases: [Case; 12] = [
-        ([25.0, 3.0, 12.0, 120.0], 0.05, 2),
-        ([25.0, 6.0, 4.0, 60.0], 0.5, 4),
-        ([20.0, 2.0, 6.3, 100.0], 0.8, 4),
-        ([40.0, 2.0, 8.0, 240.0], 0.8, 4),
-        ([30.0, 2.5, 10.5, 150.0], 0.8, 4),
-        ([20.0, 4.0, 3.0, 30.0], 0.5, 4),
-        ([50.0, 4.0, 10.0, 120.0], 0.8, 4),
-        ([40.0, 2.5, 15.0, 120.0], 0.8, 4),
-        ([30.0, 2.0, 8.0, 60.0], -0.5, 4),
-        ([24.0, 6.0, 7.25, 80.0], 0.0, 1),
-        ([40.0, 2.0, 5.75, 150.0], 0.4, 4),
-        ([16.0, 1.0, 9.4, 60.0], 0.6, 4),
+        ([25.0, 3.0, 12.0, 120.0], 0.05),
+        ([25.0, 6.0, 4.0, 60.0], 0.5),
+        ([20.0, 2.0, 6.3, 100.0], 0.8),
+        ([40.0, 2.0, 8.0, 240.0], 0.8),
+        ([30.0, 2.5, 10.5, 150.0], 0.8),
+        ([20.0, 4.0, 3.0, 30.0], 0.5),
+        ([50.0, 4.0, 10.0, 120.0], 0.8),
+        ([40.0, 2.5, 15.0, 120.0], 0.8),
+        ([30.0, 2.0, 8.0, 60.0], -0.5),
+        ([24.0, 6.0, 7.25, 80.0], 0.0),
+        ([40.0, 2.0, 5.75, 150.0], 0.4),
+        ([16.0, 1.0, 9.4, 60.0], 0.6),
     ];
     for case in &cases {
         let (error, at) = largest_error(case, Winding { left_handed: false, start_rad: 0.0 });
-        // At most 0.022, of the two springs that do not buckle and are compressed by 25 to 30 %; of the others 0.013.
-        assert!(error < 0.025, "{case:?}: {error} at {at:?}");
+        assert!(error < 0.02, "{case:?}: {error} at {at:?}");
+    }
+}
+
+/// Springs of an index of 4 to 20 and a pitch of 2 to 15 degrees under up to 80 % of the buckling load, at random. Of 1100, 14 err by
+/// more than 2 %, at most 3.1 %: short springs above 60 % of the buckling load, whose clamped ends bend them.
+#[test]
+fn springs_at_random_have_the_stiffness_of_the_rod() {
+    let mut random = Seed(25).stream("springs");
+    let mut drawn = 0;
+    while drawn < 100 {
+        let mut between = |low: f64, high: f64| random.random_range(low..high);
+        let (coil_mm, index, pitch_deg, coils) =
+            (between(10.0, 60.0), between(4.0, 20.0), between(2.0, 15.0), between(3.0, 15.0));
+        let (share, start_rad, left_handed) = (between(0.0, 0.8), between(-3.0, 3.0), between(0.0, 1.0) < 0.5);
+        let length_mm = std::f64::consts::PI * coil_mm * pitch_deg.to_radians().tan() * coils;
+        if length_mm > 1.5 * coils * coil_mm / index {
+            let case = ([coil_mm, coil_mm / index, coils, length_mm], share);
+            let (error, at) = largest_error(&case, Winding { left_handed, start_rad });
+            assert!(error < if share < 0.6 { 0.02 } else { 0.04 }, "{case:?}: {error} at {at:?}");
+            drawn += 1;
+        }
     }
 }
 
 #[test]
 fn hand_and_beginning_of_the_wire_turn_the_couplings() {
-    let case = ([20.0, 2.0, 6.3, 100.0], 0.4, 4);
+    let case = ([20.0, 2.0, 6.3, 100.0], 0.4);
     for winding in [Winding { left_handed: true, start_rad: 0.0 }, Winding { left_handed: false, start_rad: 1.1 }] {
         let (error, at) = largest_error(&case, winding);
         assert!(error < 0.02, "{winding:?}: {error} at {at:?}");

@@ -271,8 +271,9 @@ impl Problem<'_> {
         mut report: RegistrationReport,
     ) -> RegistrationResult<Registered> {
         let RegistrationInput { map_from_head, covariances, .. } = self.input;
-        let mut of_poses = Vec::new();
-        for _ in 0..MAX_ROUNDS {
+        let mut round = 0;
+        loop {
+            round += 1;
             let (start, origin) = (&pre_aligned.trajectory, pre_aligned.observed.origin);
             let corrected = CorrectedTrajectory::new(start, start, covariances, origin, self.spec);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
@@ -280,16 +281,15 @@ impl Problem<'_> {
             let registered = Registration::run(self, corrected, lidar_model, &pre_aligned.observed, report)?;
             let (Solution { corrected, lidar_model: found, equations }, updated_report) = registered;
             (lidar_model, report) = (found, updated_report);
-            of_poses = self.covariances(&corrected, &equations, report)?;
-            let next = trajectory_of(corrected, map_from_head.stamps(), report)?;
+            let next = trajectory_of(corrected.clone(), map_from_head.stamps(), report)?;
             let (shift_m, _) = largest_difference(&pre_aligned.trajectory, &next);
+            if shift_m < ROUNDS_CONVERGED_M || round == MAX_ROUNDS {
+                let covariances = self.covariances(&corrected, &equations, report)?;
+                return Ok((Registered { trajectory: next, covariances, lidar_model }, report));
+            }
             let observed = pre_aligned.observed.along(&pre_aligned.trajectory, &next);
             pre_aligned = PreAligned { trajectory: next, observed };
-            if shift_m < ROUNDS_CONVERGED_M {
-                break;
-            }
         }
-        Ok((Registered { trajectory: pre_aligned.trajectory, covariances: of_poses, lidar_model }, report))
     }
 }
 

@@ -191,7 +191,7 @@ fn tables(head: Option<&HeadModel>, report: &SpringReport) -> Vec<NotedTable> {
     }
     if let Some(at_top) = report.coil.as_ref().and_then(|coil| coil.stiffness_at_top.as_ref()) {
         let note = "Reference point: the top of the spring on its axis, guided under the load, with the foot clamped. Axes of \
-                    the spring, z from foot to top; the wire begins on x. Gravity not included.";
+                    the spring, z from foot to top; the wire begins on x, or at `start_deg` from it. Gravity not included.";
         tables.push(noted(stiffness_table("Stiffness of the spring under its load", at_top), note));
     }
     tables
