@@ -256,8 +256,7 @@ impl Problem<'_> {
         if report.revisited < self.spec.min_seen_again {
             return Ok(of_open_loop.iter().map(|(_, covariance)| *covariance).collect());
         }
-        let stamps = of_open_loop.iter().map(|(stamp, _)| *stamp);
-        uncertainty::covariances(corrected, equations, stamps).ok_or_else(|| Box::new((report, SINGULAR)))
+        uncertainty::covariances(corrected, equations, of_open_loop).ok_or_else(|| Box::new((report, SINGULAR)))
     }
 
     /// Registers a trajectory that was pre-aligned to loop closures.

@@ -137,7 +137,8 @@ fn simulated(
         ObservedSurfel { tau_s, patch, weakness: 0.0, lidar: 0 }
     };
     let surfels = (0..((duration_s - 0.05) * per_s) as usize).map(surfel).collect();
-    let covariances = times().step_by(10).map(|t| (stamp(t), PoseCovariance::identity() * (1e-5 * t))).collect();
+    let covariances =
+        times().step_by(10).map(|t| (stamp(t), PoseCovariance::identity() * (1e-5 * (1.0 + t)))).collect();
     let trajectory = |pose: &dyn Fn(f64) -> Pose| Trajectory::from_poses(times().map(|t| (stamp(t), pose(t)))).unwrap();
     let observed = ObservedSurfels {
         surfels,
@@ -170,6 +171,17 @@ fn distorted_trajectory_is_corrected() {
         "{before:?} m before, {after:?} m after: {:?}",
         closed.report
     );
+}
+
+#[test]
+fn each_pose_has_a_positive_definite_covariance_below_that_of_the_open_loop() {
+    let setup = distorted(distortion);
+    let found = setup.registered().covariances;
+    assert_eq!((found.len(), found[0]), (setup.covariances.len(), setup.covariances[0]));
+    for ((at, covariance), (stamp, of_open_loop)) in found.iter().zip(&setup.covariances) {
+        assert!(at == stamp && covariance.cholesky().is_some(), "{covariance}");
+        assert!((of_open_loop - covariance).symmetric_eigenvalues().min() > -1e-12, "{covariance} {of_open_loop}");
+    }
 }
 
 /// Views pull every lap to the first lap's distortion, so revisited surfaces agree; the motion of the second lap does not.

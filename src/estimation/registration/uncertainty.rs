@@ -21,20 +21,21 @@ const MAX_EPOCHS: usize = 100;
 /// At most this many knots are unknowns of the covariance: its cost grows with the cube.
 const MAX_NODES: usize = 100;
 
-/// Covariances of the registered poses at `stamps`, in order of time; `None` if the equations are singular.
+/// Covariances of the registered poses at the stamps of `of_open_loop`, in order of time; `None` if the equations are singular.
 ///
-/// Position (m), then attitude (rad), map axes.
+/// Position (m), then attitude (rad), map axes. The first pose, which relative to itself is certain, has the covariance of the
+/// open loop's: that of a pose within the first window.
 pub(super) fn covariances(
     corrected: &CorrectedTrajectory,
     equations: &Equations,
-    stamps: impl Iterator<Item = Stamp>,
+    of_open_loop: &[(Stamp, PoseCovariance)],
 ) -> Option<Vec<PoseCovariance>> {
     let epochs = corrected.epochs(MAX_EPOCHS);
     let bases: Vec<Basis> = epochs.iter().map(|epoch| epoch.basis).collect();
     let reduction = Reduction::new(&corrected.knot_positions(), MAX_NODES);
     let of_corrections = reduction.covariances(equations, &bases)?;
     let (first, of_first) = (epochs.first()?, of_corrections.first()?.own);
-    let of_poses: Vec<(Stamp, PoseCovariance)> = epochs
+    let mut of_poses: Vec<(Stamp, PoseCovariance)> = epochs
         .iter()
         .zip(&of_corrections)
         .map(|(epoch, of)| {
@@ -42,7 +43,10 @@ pub(super) fn covariances(
             (epoch.stamp, relative_to_first(of, &of_first, &apart))
         })
         .collect();
-    Some(stamps.map(|stamp| interpolated(&of_poses, stamp)).collect())
+    if let (Some(first), Some((_, in_window))) = (of_poses.first_mut(), of_open_loop.first()) {
+        first.1 = *in_window;
+    }
+    Some(of_open_loop.iter().map(|(stamp, _)| interpolated(&of_poses, *stamp)).collect())
 }
 
 /// The covariance of a pose that is `apart` from the first one, m.
