@@ -57,6 +57,24 @@ fn rosbags_reads_a_folder_with_our_metadata() {
 }
 
 #[test]
+fn the_dataset_of_evalio_agrees_with_mcap_for_python() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut recordings = Vec::new();
+    for lidar in ["mid360", "vlp16", "utm30lx"] {
+        let settings = "--scene office --clock coarse --duration 4s --seed 4 --quiet";
+        let (code, _, stderr) =
+            crate::command::run(folder.path(), &format!("simulate --lidar {lidar} {settings} --out {lidar}.mcap"));
+        assert_eq!(code, 0, "{stderr}");
+        recordings.push(folder.path().join(format!("{lidar}.mcap")));
+    }
+    let script = here("tests/check_evalio.py");
+    let Some(output) = run_or_skip("evalio", python().arg(script).args(recordings)) else { return };
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{stdout}{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(stdout.lines().filter(|line| line.starts_with("ok ")).count(), 3, "{stdout}");
+}
+
+#[test]
 fn the_acceptance_check_passes() {
     let script = here("../shared/tools/check_mcap.py");
     if !script.exists() {
