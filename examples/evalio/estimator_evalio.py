@@ -24,7 +24,7 @@ class ZsimEstimator(Pipeline):
 
     @staticmethod
     def url() -> str:
-        return "docs/estimator.md in the repository of zsim"
+        return "docs/guide/python.md in the repository of zsim"
 
     @staticmethod
     def version() -> str:
