@@ -271,7 +271,8 @@ const finish = async ({ report }) => {
       [link.href, link.target] = [URL.createObjectURL(await response.blob()), "_blank"];
     }
   }
-  await fetch(query("&leaves=1"));
+  // The server may end before it has answered.
+  await fetch(query("&leaves=1")).catch(() => null);
 };
 
 const listen = async () => {
