@@ -8,6 +8,9 @@ use crate::measurement::LidarScan;
 /// Point rate from which on the minimum number of points of a surfel is as specified, points/s; lower in proportion for
 /// a sparser lidar.
 const DENSE_PER_S: f64 = 28_000.0;
+/// Point rate up to which the minimum number of points of a surfel of the registration is as specified, points/s; higher in
+/// proportion for a denser lidar. That of a UTM-30LX; surfels of few points of a denser one are slivers of a surface.
+const REGISTERED_PER_S: f64 = 43_000.0;
 /// Lower limit of the minimum number of points for a sparse lidar.
 const SPARSE_MIN_POINTS: usize = 8;
 /// Surfels of a planar lidar combine successive scans: minimum of `split_gap_s` and of `max_duration_s`, in scan periods.
@@ -50,7 +53,8 @@ impl ScanGeometry {
         self.one_sidedness > ONE_DIRECTION_THRESHOLD
     }
 
-    /// Adapts the settings: fewer points per surfel for a sparse lidar, longer surfels for a slow one.
+    /// Adapts the settings: fewer points per surfel for a sparse lidar, more per surfel of the registration for a dense
+    /// one, longer surfels for a slow one.
     pub(super) fn adapt(self, spec: &EstimatorSpec) -> EstimatorSpec {
         let mut adapted = spec.clone();
         let ratio = if self.points_per_s > 0.0 { (self.points_per_s / DENSE_PER_S).min(1.0) } else { 1.0 };
@@ -61,7 +65,8 @@ impl ScanGeometry {
             *split_gap_s = split_gap_s.max(PERIODS.0 * period_s);
             *max_duration_s = max_duration_s.max(PERIODS.1 * period_s);
         }
-        adapted.registration.min_points = fewer(adapted.registration.min_points);
+        let times_denser = (self.points_per_s / REGISTERED_PER_S).max(1.0);
+        adapted.registration.min_points = (spec.registration.min_points as f64 * times_denser).round() as usize;
         if self.is_one_way() {
             *range_offset_sigma_m = 0.0;
         }
@@ -110,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_sparse_lidar_reduces_the_minimum_number_of_points() {
+    fn the_minimum_number_of_points_follows_the_density() {
         let spec = load("default").unwrap();
         let dense: Vec<LidarScan> = (0..40).map(|_| fan(135.0, 1081)).collect();
         assert_eq!(ScanGeometry::measure(dense.iter(), 1.0, 0.025).adapt(&spec), spec);
@@ -121,6 +126,12 @@ mod tests {
         );
         let poor = ScanGeometry::measure([fan(135.0, 100)].iter(), 1.0, 0.025).adapt(&spec);
         assert_eq!(poor.surfels.min_points, SPARSE_MIN_POINTS);
+        let points = |beams: usize| {
+            let scans: Vec<LidarScan> = (0..40).map(|_| fan(135.0, beams)).collect();
+            ScanGeometry::measure(scans.iter(), 1.0, 0.025).adapt(&spec).registration.min_points
+        };
+        let specified = spec.registration.min_points;
+        assert_eq!([350, 1081, 3225].map(points), [specified, specified, 3 * specified]);
         // A lower specified number is not increased.
         let mut few = spec;
         few.surfels.min_points = 5;

@@ -26,7 +26,7 @@ pub(super) struct MatchStatistics {
     /// Sum of weights, and weighted sum of squared distances, m^2.
     pub(super) weights: f64,
     pub(super) squares: f64,
-    /// Information about the position: `sum w n n^T`.
+    /// Information about the position by matches between submaps: `sum w n n^T`.
     pub(super) information: Matrix,
     /// Information along the weakest direction, only from normals with a large component along it.
     pub(super) weak_information: f64,
@@ -35,10 +35,14 @@ pub(super) struct MatchStatistics {
 }
 
 impl MatchStatistics {
-    fn count(&mut self, plane: &Plane, weight: f64, weakest: &Vector, is_revisit: bool) {
+    fn count(&mut self, plane: &Plane, weight: f64) {
         self.matches += 1;
         self.weights += weight;
         self.squares += weight * plane.distance_m * plane.distance_m;
+    }
+
+    /// Adds the information of a match between two submaps.
+    fn inform(&mut self, plane: &Plane, weight: f64, weakest: &Vector, is_revisit: bool) {
         self.information += plane.normal * plane.normal.transpose() * weight;
         let component = plane.normal.dot(weakest);
         if component.abs() > MIN_SIGNIFICANT_TILT {
@@ -129,8 +133,11 @@ impl Matches<'_> {
             sum.pair_term.first.add_shared(&by_a, &by_shared, weight);
             sum.pair_term.second.add_shared(&by_b, &by_shared, weight);
             sum.shared_term.add(&by_shared, plane.distance_m, weight);
-            let is_revisit = self.scene.time_difference_s(i, j) > self.spec.again_after_s;
-            sum.statistics.count(&plane, weight, &self.weakest, is_revisit);
+            sum.statistics.count(&plane, weight);
+            if !self.scene.are_of_one_submap(i, j) {
+                let is_revisit = self.scene.time_difference_s(i, j) > self.spec.again_after_s;
+                sum.statistics.inform(&plane, weight, &self.weakest, is_revisit);
+            }
         }
         sum
     }

@@ -27,6 +27,8 @@ pub(super) struct Scene {
     /// Spline basis at the middle of each time bin; a bin is half a knot interval.
     pub(super) bin_bases: Vec<Basis>,
     pub(super) submaps: Vec<Range<usize>>,
+    /// Submap of each surfel.
+    submap_of: Vec<u32>,
     /// Pairs of submaps to be matched.
     pub(super) pairs: Vec<(usize, usize)>,
 }
@@ -62,13 +64,30 @@ impl Scene {
         };
         let bin_bases = (0..=((end_s - start_s) / length_s) as u32).map(bin_basis).collect();
         let submaps = submaps::divide(&times_s, spec.chapter_s);
+        let submap_of = (0..).zip(&submaps).flat_map(|(k, submap)| submap.clone().map(move |_| k)).collect();
         let pairs = submaps::select_pairs(&patches, &submaps, spec);
-        Self { spacing_s: spec.knot_spacing_s, times_s, patches, arms, rays, bins, bin_bases, submaps, pairs }
+        Self {
+            spacing_s: spec.knot_spacing_s,
+            times_s,
+            patches,
+            arms,
+            rays,
+            bins,
+            bin_bases,
+            submaps,
+            submap_of,
+            pairs,
+        }
     }
 
     /// Time of surfel `j` minus time of surfel `i`, s.
     pub(super) fn time_difference_s(&self, i: usize, j: usize) -> f64 {
         self.times_s[j] - self.times_s[i]
+    }
+
+    /// Whether two surfels are of the same submap.
+    pub(super) fn are_of_one_submap(&self, i: usize, j: usize) -> bool {
+        self.submap_of[i] == self.submap_of[j]
     }
 
     /// Moves every surfel by the correction of the trajectory at that time, then by the step of the lidar.

@@ -17,6 +17,10 @@ pub struct RegistrationSpec {
     pub levels: usize,
     /// Minimum number of points of a surfel.
     pub min_points: usize,
+    /// Minimum planarity of a surfel, 0 to 1. With 0 it may be a line: the normal of a match is that of both surfels
+    /// together, and two lines on one surface determine it.
+    #[serde(default, with = "crate::spec::checked::Fraction")]
+    pub min_planarity: f64,
     /// Maximum duration of a surfel, s; points of a cell that span more are split.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_duration_s: f64,
@@ -94,6 +98,7 @@ impl RegistrationSpec {
             finest_voxel_m: self.finest_voxel_m,
             levels: self.levels,
             min_points: self.min_points,
+            min_planarity: self.min_planarity,
             max_duration_s: self.max_duration_s,
             ..open_loop.clone()
         }

@@ -1,9 +1,9 @@
 //! Submaps, and the selection of the pairs of submaps that are matched.
 //!
 //! The recording is divided into submaps of a few seconds. Some of them, spread over the recording, are *references*, such
-//! that each cell is observed by a given number of references. The surfels of every submap are matched with the references
-//! that observe the same cells. The number of references does not grow with the time spent in one area: the other submaps
-//! are linked to references and to their neighbours in time only, and the equations stay sparse.
+//! that each cell is observed by a given number of references. The surfels of every submap are matched with each other and
+//! with the references that observe the same cells. The number of references does not grow with the time spent in one area:
+//! the other submaps are linked to references and to their neighbours in time only, and the equations stay sparse.
 
 use super::RegistrationSpec;
 use crate::estimation::surfel::Patch;
@@ -32,7 +32,7 @@ pub(super) fn divide(times_s: &[f64], length_s: f64) -> Vec<Range<usize>> {
     submaps
 }
 
-/// Pairs of submaps to be matched, sorted.
+/// Pairs of submaps to be matched, sorted. Each submap is also matched with itself.
 pub(super) fn select_pairs(
     patches: &[Patch],
     submaps: &[Range<usize>],
@@ -53,7 +53,8 @@ pub(super) fn select_pairs(
                 common.into_iter().filter(|(b, count)| enough(*b, *count)).collect();
             partners.sort_by_key(|(b, count)| (std::cmp::Reverse(*count), *b));
             partners.truncate(spec.partners);
-            partners.into_iter().map(move |(b, _)| (a.min(b), a.max(b)))
+            let others = partners.into_iter().map(move |(b, _)| (a.min(b), a.max(b)));
+            others.chain([(a, a)])
         })
         .collect();
     pairs.sort_unstable();
@@ -84,6 +85,7 @@ fn bit_reversed_order(count: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Matrix, Vector};
 
     #[test]
     fn bit_reversed_order_is_a_permutation_with_spread_prefixes() {
@@ -100,6 +102,22 @@ mod tests {
     fn submaps_divide_time_and_skip_empty_intervals() {
         assert_eq!(divide(&[0.0, 1.0, 4.9, 5.1, 5.2, 31.0], 5.0), [0..3, 3..5, 5..6]);
         assert_eq!(divide(&[], 5.0), Vec::<Range<usize>>::new());
+    }
+
+    #[test]
+    fn every_submap_is_matched_with_itself_and_with_those_that_observe_the_same() {
+        let spec = crate::estimation::load("default").unwrap().registration;
+        let patch = |x_m: f64| Patch {
+            centre: Vector::new(x_m, 0.0, 0.0),
+            normal: Vector::z(),
+            points: 10.0,
+            covariance: Matrix::identity(),
+            roughness_variance: 0.0,
+            level: 0,
+        };
+        let patches: Vec<Patch> = [0.0, 0.1, 500.0, 0.2].map(patch).into();
+        let pairs = select_pairs(&patches, &[0..2, 2..3, 3..4], &spec);
+        assert_eq!(pairs, [(0, 0), (0, 2), (1, 1), (2, 2)]);
     }
 
     #[test]
