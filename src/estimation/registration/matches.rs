@@ -12,6 +12,7 @@ use super::scene::Scene;
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::MIN_SIGNIFICANT_TILT;
 use crate::estimation::residual::matched::Plane;
+use crate::estimation::surfel::Patch;
 use crate::geometry::{Matrix, Vector};
 use nalgebra::Vector6;
 use rayon::prelude::*;
@@ -121,7 +122,9 @@ impl Matches<'_> {
             if !self.matcher.pass_gates(a, b, self.gate_m) {
                 continue;
             }
-            let plane = Plane::of(a, b, self.spec.match_sigma_m);
+            let mut plane = Plane::of(a, b, self.spec.match_sigma_m);
+            plane.variance +=
+                self.variance_of_few_points(a, &plane.normal) + self.variance_of_few_points(b, &plane.normal);
             let weight = self.weight(&plane, i, j);
             let by = |arm: &Vector, normal: &Vector| {
                 let turn = arm.cross(normal);
@@ -140,6 +143,13 @@ impl Matches<'_> {
             }
         }
         sum
+    }
+
+    /// Additional variance along `normal` of a surfel with few points, m^2: the noise of its mean is inversely proportional
+    /// to their number.
+    fn variance_of_few_points(&self, patch: &Patch, normal: &Vector) -> f64 {
+        let excess = (self.spec.full_weight_points as f64 / patch.points - 1.0).max(0.0);
+        excess * normal.dot(&(patch.covariance * normal)).max(0.0)
     }
 
     /// Weight of a match with a Cauchy kernel.

@@ -21,6 +21,10 @@ pub struct RegistrationSpec {
     /// together, and two lines on one surface determine it.
     #[serde(default, with = "crate::spec::checked::Fraction")]
     pub min_planarity: f64,
+    /// Number of points from which on a surfel has its full weight; with fewer, its variance along the normal counts in
+    /// inverse proportion to the number. 0: all have their full weight.
+    #[serde(default)]
+    pub full_weight_points: usize,
     /// Maximum duration of a surfel, s; points of a cell that span more are split.
     #[serde(with = "crate::spec::checked::Positive")]
     pub max_duration_s: f64,
