@@ -375,33 +375,54 @@ fn no_observed_surfels_keep_the_open_loop() {
     assert_eq!(nothing.registered().trajectory, Trajectory::new());
 }
 
-/// Two patches of a wall at a distance of 4 mm; only the first moves with the correction.
+/// Two patches of a wall at a distance of 4 mm, each of the given number of points, at the middles of two time bins.
+struct PatchesOfWall {
+    spec: EstimatorSpec,
+    observed: ObservedSurfels,
+    corrected: CorrectedTrajectory,
+    lidar_model: LidarModel,
+    matcher: Matcher,
+}
+
+impl PatchesOfWall {
+    fn of_points(points: f64) -> Self {
+        let spec = load("default").unwrap();
+        let Setup { open, covariances, observed, .. } = distorted(|_| (Rotation::identity(), Vector::zeros()));
+        let length_s = 0.5 * spec.registration.knot_spacing_s;
+        let times_s = [4.5 * length_s, 60.5 * length_s];
+        let wall = observed.surfels.iter().find(|surfel| surfel.patch.normal.x > 0.5).unwrap();
+        let surfel = |k: usize| {
+            let centre = Vector::new(-4.9 + 0.004 * k as f64, 0.4 + 0.1 * k as f64, 1.4);
+            ObservedSurfel { tau_s: times_s[k], patch: Patch { centre, points, ..wall.patch }, ..*wall }
+        };
+        let observed = ObservedSurfels { surfels: vec![surfel(0), surfel(1)], ..observed };
+        let corrected = CorrectedTrajectory::new(&open, &open, &covariances, observed.origin, &spec.registration);
+        let matching = &spec.registration.matching(&spec.matching);
+        let matcher = Matcher::new(matching, &spec.registration.surfels(&spec.surfels));
+        let lidar_model = LidarModel::new(&calibration(), &LidarCorrection::default(), &observed, &spec);
+        Self { corrected: corrected.unwrap(), spec, observed, lidar_model, matcher }
+    }
+
+    fn scene(&self) -> Scene {
+        Scene::new(&self.observed, &self.corrected, &self.lidar_model, &self.spec.registration)
+    }
+
+    fn sum(&self, scene: &Scene) -> BinPairSums {
+        let (spec, matcher) = (&self.spec.registration, &self.matcher);
+        let mut neighbours = Neighbours::new(spec.levels);
+        neighbours.update(0, scene, matcher, 1);
+        let neighbours = &neighbours.active;
+        Matches { scene, neighbours, matcher, spec, gate_m: 0.1, weakest: Vector::z() }.sum(&neighbours.pairs)
+    }
+}
+
+/// Only the first patch moves with the correction.
 #[test]
 fn derivatives_of_a_match_match_finite_differences() {
-    let spec = load("default").unwrap();
-    let Setup { open, covariances, observed, .. } = distorted(|_| (Rotation::identity(), Vector::zeros()));
-    let length_s = 0.5 * spec.registration.knot_spacing_s;
-    // At the middles of two time bins.
-    let times_s = [4.5 * length_s, 60.5 * length_s];
-    let wall = observed.surfels.iter().find(|surfel| surfel.patch.normal.x > 0.5).unwrap();
-    let surfel = |k: usize| {
-        let centre = Vector::new(-4.9 + 0.004 * k as f64, 0.4 + 0.1 * k as f64, 1.4);
-        ObservedSurfel { tau_s: times_s[k], patch: Patch { centre, ..wall.patch }, ..*wall }
-    };
-    let observed = ObservedSurfels { surfels: vec![surfel(0), surfel(1)], ..observed };
-    let corrected = CorrectedTrajectory::new(&open, &open, &covariances, observed.origin, &spec.registration).unwrap();
-    let matcher = Matcher::new(&spec.registration.matching(&spec.matching), &spec.registration.surfels(&spec.surfels));
-    let lidar_model = LidarModel::new(&calibration(), &LidarCorrection::default(), &observed, &spec);
-    let scene = Scene::new(&observed, &corrected, &lidar_model, &spec.registration);
-    let (first_knot, knots) = corrected.knots();
-    let sum = |scene: &Scene| {
-        let mut neighbours = Neighbours::new(spec.registration.levels);
-        neighbours.update(0, scene, &matcher, 1);
-        let (neighbours, registration) = (&neighbours.active, &spec.registration);
-        Matches { scene, neighbours, matcher: &matcher, spec: registration, gate_m: 0.1, weakest: Vector::z() }
-            .sum(&neighbours.pairs)
-    };
-    let BinPairSums { pair_term, statistics, .. } = sum(&scene);
+    let patches = PatchesOfWall::of_points(100.0);
+    let scene = patches.scene();
+    let (first_knot, knots) = patches.corrected.knots();
+    let BinPairSums { pair_term, statistics, .. } = patches.sum(&scene);
     assert_eq!(statistics.matches, 1);
     // The first is 4 mm below the second along the normal, x.
     let e = -statistics.rms_m();
@@ -412,12 +433,31 @@ fn derivatives_of_a_match_match_finite_differences() {
             let mut x = vec![0.0; 6 * knots];
             let segment = (scene.bin_bases[scene.bins[0] as usize].first - first_knot) as usize;
             (segment..segment + 4).for_each(|knot| x[6 * knot + axis] = by);
-            let mut scene = Scene::new(&observed, &corrected, &lidar_model, &spec.registration);
+            let mut scene = patches.scene();
             scene.correct(first_knot, &x, &Shared::zeros());
-            -sum(&scene).statistics.rms_m()
+            -patches.sum(&scene).statistics.rms_m()
         };
         let difference = (moved(step) - moved(-step)) / (2.0 * step);
         // The derivative neglects the rotation of the common normal, with a lever arm of 0.1 m.
         assert!((difference - derivative[axis]).abs() < 0.06, "{axis}: {difference} and {}", derivative[axis]);
     }
+}
+
+/// The mean of a quarter of the points has four times the variance.
+#[test]
+fn a_match_of_few_points_has_the_variance_of_its_means() {
+    let full_points = load("default").unwrap().registration.full_weight_points as f64;
+    let match_of = |points: f64| {
+        let patches = PatchesOfWall::of_points(points);
+        let scene = patches.scene();
+        (patches.sum(&scene).statistics, patches.spec.registration)
+    };
+    let (full, spec) = match_of(full_points);
+    let (few, _) = match_of(0.25 * full_points);
+    let variance = PatchesOfWall::of_points(full_points).observed.surfels[0].patch.covariance[(0, 0)];
+    // With a Cauchy kernel the inverse weight is the variance plus a multiple of the squared distance; each of the two surfels
+    // has one match.
+    let added = (few.weights.recip() - full.weights.recip()) * 2.0 * spec.match_weight;
+    assert!((added / (2.0 * 3.0 * variance) - 1.0).abs() < 1e-6, "{added} and {variance}");
+    assert_eq!(match_of(2.0 * full_points).0.weights, full.weights);
 }
