@@ -1,7 +1,9 @@
 //! Sets of finest cells as bitmaps of 8 x 8 x 8 cells: successive cells along a beam are mostly in the same bitmap.
 
 use super::cell::morton_code;
-use std::collections::BTreeMap;
+use ahash::AHasher;
+use indexmap::IndexMap;
+use std::hash::BuildHasherDefault;
 
 /// Level of the cells that are stored as one bitmap (8 finest cells per edge).
 const LEVEL: u32 = 3;
@@ -9,7 +11,8 @@ const LEVEL: u32 = 3;
 /// A set of finest cells.
 #[derive(Debug, Default)]
 pub(super) struct CellSet {
-    cubes: BTreeMap<u64, Cube>,
+    /// By Morton code, in the order of their first cells: the order does not depend on the hash.
+    cubes: IndexMap<u64, Cube, BuildHasherDefault<AHasher>>,
 }
 
 /// Bitmap of the finest cells in one cube.

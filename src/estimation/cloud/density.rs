@@ -58,7 +58,8 @@ pub(super) struct Density {
 impl Density {
     pub(super) fn from_blocks<'a>(blocks: impl Iterator<Item = &'a BlockCounts>) -> Self {
         let mut cells: Vec<(u64, u32)> = blocks.flat_map(|block| &block.cells).copied().collect();
-        cells.sort_unstable();
+        // The blocks are sorted: a stable sort merges them.
+        cells.sort();
         let mut cumulative = Vec::with_capacity(cells.len() + 1);
         let mut sum = 0;
         for (_, count) in &cells {

@@ -64,7 +64,7 @@ impl Neighbours {
         }
         if changed {
             self.finest = finest;
-            let pairs = self.levels[finest..].iter().flatten().flat_map(|found| &found.pairs).copied().collect();
+            let pairs = self.levels[finest..].iter().flatten().flat_map(|found| &found.pairs).copied();
             self.active = ActiveNeighbours::of(pairs, scene);
         }
         changed
@@ -77,23 +77,24 @@ impl Neighbours {
 }
 
 impl ActiveNeighbours {
-    fn of(mut pairs: Vec<(u32, u32)>, scene: &Scene) -> Self {
-        let bins = |(i, j): &(u32, u32)| (scene.bins[*i as usize], scene.bins[*j as usize]);
-        pairs.par_sort_unstable_by_key(|pair| (bins(pair), *pair));
+    fn of(pairs: impl Iterator<Item = (u32, u32)>, scene: &Scene) -> Self {
+        let bins = |(i, j): (u32, u32)| (scene.bins[i as usize], scene.bins[j as usize]);
+        let mut pairs: Vec<((u32, u32), (u32, u32))> = pairs.map(|pair| (bins(pair), pair)).collect();
+        pairs.par_sort_unstable();
         let mut runs = Vec::new();
         let mut from = 0;
         for k in 1..=pairs.len() {
-            if k == pairs.len() || bins(&pairs[k]) != bins(&pairs[from]) {
+            if k == pairs.len() || pairs[k].0 != pairs[from].0 {
                 runs.push(from..k);
                 from = k;
             }
         }
         let mut counts = vec![0; scene.patches.len()];
-        for (i, j) in &pairs {
+        for (_, (i, j)) in &pairs {
             counts[*i as usize] += 1;
             counts[*j as usize] += 1;
         }
-        Self { pairs, runs, counts }
+        Self { pairs: pairs.into_iter().map(|(_, pair)| pair).collect(), runs, counts }
     }
 }
 
