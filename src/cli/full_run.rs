@@ -9,7 +9,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim::report::{self, Metrics};
-use zsim::simulation::Simulation;
+use zsim::simulation::{Outputs, Simulation};
 use zsim::study::{self, EstimateResult, ProgressMonitor, StudyEvent};
 
 #[derive(Args)]
@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
     let mut live = arguments.live.start(|| study::live_page(&simulation))?;
     let mut bars = Bars::new(global);
-    recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
+    recording_size::check(&simulation, Outputs::All, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
     let written: Vec<PathBuf> = study::full_run_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;

@@ -1,4 +1,4 @@
-//! The two files of a simulated recording, reserved before anything is computed.
+//! The files of a simulated recording, reserved before anything is computed.
 
 use super::output::{candidates, check_not_inputs, create_parent};
 use super::usage::Usage;
@@ -7,25 +7,25 @@ use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A recording and the true trajectory next to it, as files that only this process has created.
+/// A recording and, unless it has none, the true trajectory next to it, as files that only this process has created.
 ///
 /// Files that exist are replaced only by [`finish`](Self::finish): until then the new files have temporary names, so
 /// that a failed run destroys no file.
 pub(super) struct RecordingFiles {
     recording: PathBuf,
-    truth: PathBuf,
+    truth: Option<PathBuf>,
     /// Final path of the complete recording, if it is written under a temporary name.
     replaces: Option<PathBuf>,
     is_finished: bool,
 }
 
 impl RecordingFiles {
-    /// Reserves `wanted` and the file of the same name that ends in `.tum`. Where one of them exists a number is added
-    /// to both names, unless `force` permits to replace them. No file of `inputs` is ever replaced.
+    /// Reserves `wanted` and, with `truth`, the file of the same name that ends in `.tum`. Where one of them exists a number is
+    /// added to both names, unless `force` permits to replace them. No file of `inputs` is ever replaced.
     ///
     /// # Errors
     /// When the two files would be one, an input would be replaced, or they cannot be created.
-    pub fn reserve(wanted: &Path, force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
+    pub fn reserve(wanted: &Path, truth: bool, force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
         if wanted.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tum")) {
             let message = format!(
                 "--out {}: the recording needs another ending, such as .mcap; the true trajectory is written next to it \
@@ -35,28 +35,28 @@ impl RecordingFiles {
             return Err(Usage(message).into());
         }
         create_parent(wanted)?;
-        let outputs = [wanted.to_owned(), truth_of(wanted)];
+        let outputs: Vec<PathBuf> = [wanted.to_owned()].into_iter().chain(truth.then(|| truth_of(wanted))).collect();
         if !(force && outputs.iter().any(|path| path.exists())) {
-            return Self::first_free(wanted, None);
+            return Self::first_free(wanted, truth, None);
         }
         for path in &outputs {
             ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
         }
         check_not_inputs(inputs, &outputs)?;
         let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
-        Self::first_free(&wanted.with_extension(format!("partial{ending}")), Some(wanted))
+        Self::first_free(&wanted.with_extension(format!("partial{ending}")), truth, Some(wanted))
     }
 
-    /// Creates both files under the first name, `wanted` or `wanted` with a number, that neither of them has taken.
+    /// Creates the files under the first name, `wanted` or `wanted` with a number, that neither of them has taken.
     ///
     /// [`finish`](Self::finish) then moves them to `replaces`, if given.
-    fn first_free(wanted: &Path, replaces: Option<&Path>) -> anyhow::Result<Self> {
+    fn first_free(wanted: &Path, truth: bool, replaces: Option<&Path>) -> anyhow::Result<Self> {
         for recording in candidates(wanted) {
-            let truth = truth_of(&recording);
+            let truth = truth.then(|| truth_of(&recording));
             if !is_created(&recording)? {
                 continue;
             }
-            if is_created(&truth)? {
+            if truth.as_deref().map_or(Ok(true), is_created)? {
                 return Ok(Self { recording, truth, replaces: replaces.map(Path::to_owned), is_finished: false });
             }
             std::fs::remove_file(&recording).with_context(|| format!("{} cannot be removed", recording.display()))?;
@@ -69,31 +69,31 @@ impl RecordingFiles {
         &self.recording
     }
 
-    /// Where the true trajectory is written.
-    pub fn truth(&self) -> &Path {
-        &self.truth
+    /// Where the true trajectory is written, if it is.
+    pub fn truth(&self) -> Option<&Path> {
+        self.truth.as_deref()
     }
 
     /// Moves the complete files to the names that they replace; returns the final names.
     ///
     /// # Errors
     /// When they cannot be moved.
-    pub fn finish(mut self) -> anyhow::Result<(PathBuf, PathBuf)> {
+    pub fn finish(mut self) -> anyhow::Result<(PathBuf, Option<PathBuf>)> {
         self.is_finished = true;
         let Some(wanted) = self.replaces.take() else { return Ok((self.recording.clone(), self.truth.clone())) };
-        let truth = truth_of(&wanted);
-        for (from, to) in [(&self.truth, &truth), (&self.recording, &wanted)] {
+        let truth = self.truth.as_ref().map(|from| (from, truth_of(&wanted)));
+        for (from, to) in truth.iter().map(|(from, to)| (*from, to)).chain([(&self.recording, &wanted)]) {
             std::fs::rename(from, to)
                 .with_context(|| format!("{} cannot be moved to {}", from.display(), to.display()))?;
         }
-        Ok((wanted, truth))
+        Ok((wanted.clone(), truth.map(|(_, truth)| truth)))
     }
 }
 
 impl Drop for RecordingFiles {
     /// Removes the files of a run that failed before it wrote anything.
     fn drop(&mut self) {
-        for path in [&self.recording, &self.truth].into_iter().filter(|_| !self.is_finished) {
+        for path in [&self.recording].into_iter().chain(&self.truth).filter(|_| !self.is_finished) {
             if std::fs::metadata(path).is_ok_and(|file| file.len() == 0) {
                 // A file that cannot be removed is empty and harmless.
                 let _ = std::fs::remove_file(path);
@@ -124,15 +124,17 @@ mod tests {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("run.mcap");
         std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
-        let first = RecordingFiles::reserve(&wanted, false, &[]).unwrap();
-        let second = RecordingFiles::reserve(&wanted, false, &[]).unwrap();
+        let first = RecordingFiles::reserve(&wanted, true, false, &[]).unwrap();
+        let second = RecordingFiles::reserve(&wanted, true, false, &[]).unwrap();
         assert_eq!(first.recording(), here.path().join("run-2.mcap"));
         assert_eq!(second.recording(), here.path().join("run-3.mcap"));
-        assert_eq!(second.truth(), here.path().join("run-3.tum"));
+        assert_eq!(second.truth(), Some(here.path().join("run-3.tum").as_path()));
         drop((first, second));
         assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1, "empty files are removed");
-        assert!(RecordingFiles::reserve(&here.path().join("y.tum"), true, &[]).is_err());
-        assert!(RecordingFiles::reserve(Path::new(""), false, &[]).is_err());
+        let without_truth = RecordingFiles::reserve(&wanted, false, false, &[]).unwrap();
+        assert_eq!((without_truth.recording(), without_truth.truth()), (wanted.as_path(), None));
+        assert!(RecordingFiles::reserve(&here.path().join("y.tum"), true, true, &[]).is_err());
+        assert!(RecordingFiles::reserve(Path::new(""), true, false, &[]).is_err());
     }
 
     #[test]
@@ -141,14 +143,14 @@ mod tests {
         let wanted = here.path().join("run.mcap");
         let old = here.path().join("run.tum");
         std::fs::write(&old, "old").unwrap();
-        let files = RecordingFiles::reserve(&wanted, true, &[]).unwrap();
+        let files = RecordingFiles::reserve(&wanted, true, true, &[]).unwrap();
         std::fs::write(files.recording(), "new recording").unwrap();
-        std::fs::write(files.truth(), "new").unwrap();
+        std::fs::write(files.truth().unwrap(), "new").unwrap();
         assert_eq!(std::fs::read_to_string(&old).unwrap(), "old");
-        assert_eq!(files.finish().unwrap(), (wanted.clone(), old.clone()));
+        assert_eq!(files.finish().unwrap(), (wanted.clone(), Some(old.clone())));
         assert_eq!(std::fs::read_to_string(&old).unwrap(), "new");
         assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 2);
-        let error = RecordingFiles::reserve(&wanted, true, &[old]).err().unwrap();
+        let error = RecordingFiles::reserve(&wanted, true, true, &[old]).err().unwrap();
         assert!(error.to_string().contains("would be replaced"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 use anyhow::ensure;
 use std::path::Path;
 use zsim::sensors::{Imu, Lidar};
-use zsim::simulation::{STEP_S, Simulation};
+use zsim::simulation::{Outputs, STEP_S, Simulation};
 use zsim::study::free_bytes;
 
 /// Bytes of a beam in a `LaserScan` (range and intensity) and in a `PointCloud2`, compressed, as measured with the
@@ -21,8 +21,13 @@ const LARGE_BYTES: f64 = 1e9;
 ///
 /// # Errors
 /// When the file system has less free space.
-pub(super) fn check(simulation: &Simulation, wanted: &Path, note: impl Fn(&str)) -> anyhow::Result<()> {
-    let bytes = expected_bytes(simulation);
+pub(super) fn check(
+    simulation: &Simulation,
+    outputs: Outputs,
+    wanted: &Path,
+    note: impl Fn(&str),
+) -> anyhow::Result<()> {
+    let bytes = expected_bytes(simulation, outputs);
     if bytes < LARGE_BYTES {
         return Ok(());
     }
@@ -42,13 +47,14 @@ pub(super) fn check(simulation: &Simulation, wanted: &Path, note: impl Fn(&str))
 }
 
 /// The size of the recording and of the true trajectory next to it, bytes, give or take a third.
-fn expected_bytes(simulation: &Simulation) -> f64 {
+fn expected_bytes(simulation: &Simulation, outputs: Outputs) -> f64 {
     let of_imu = |imu: &Imu| IMU_SAMPLE_BYTES / imu.period_s();
-    let per_s = lidar_bytes_per_s(simulation.lidar())
-        + of_imu(simulation.imu())
-        + simulation.base_imu().map_or(0.0, of_imu)
-        + TRUTH_BYTES / STEP_S;
-    per_s * simulation.inputs().duration_s
+    let of_imus = of_imu(simulation.imu()) + simulation.base_imu().map_or(0.0, of_imu);
+    let of_others = match outputs {
+        Outputs::All => lidar_bytes_per_s(simulation.lidar()) + TRUTH_BYTES / STEP_S,
+        Outputs::Imus => 0.0,
+    };
+    (of_imus + of_others) * simulation.inputs().duration_s
 }
 
 fn lidar_bytes_per_s(lidar: &Lidar) -> f64 {
@@ -73,7 +79,7 @@ mod tests {
             let mut watch = ProgressMonitor { stop: &AtomicBool::new(false), report: &mut |_| {} };
             record(&simulation, &files[0], &files[1], false, &mut watch).unwrap();
             let bytes: u64 = files.iter().map(|file| file.metadata().unwrap().len()).sum();
-            let ratio = expected_bytes(&simulation) / bytes as f64;
+            let ratio = expected_bytes(&simulation, Outputs::All) / bytes as f64;
             assert!((0.7..1.5).contains(&ratio), "{lidar}: {ratio}");
         }
     }

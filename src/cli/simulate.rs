@@ -10,14 +10,15 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::recording::write_rosbag2_metadata;
 use zsim::report;
-use zsim::simulation::{Simulation, SimulationSummary};
+use zsim::simulation::{Outputs, Simulation, SimulationSummary};
 use zsim::study::{self, ProgressMonitor};
 
 /// Simulate and record: an MCAP file with the truth inside, and the true trajectory next to it as a TUM file
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim simulate --scene office --duration 2min --out office.mcap\n  zsim simulate --scene \
-                        office --rosbag2 office"
+                        office --rosbag2 office\n  zsim simulate --scene open_field --head rigid --motion stand --imu-only \
+                        --duration 6h"
 )]
 pub(super) struct Arguments {
     /// The world, a name under scenes/ or a file
@@ -37,6 +38,9 @@ pub(super) struct Arguments {
     /// Show the true head in /tf, for looking; an estimate of one's own would contradict it
     #[arg(long)]
     truth_tf: bool,
+    /// Record the IMU only, without lidar and truth, many times as fast: long records for Allan deviations
+    #[arg(long, conflicts_with = "truth_tf")]
+    imu_only: bool,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
@@ -49,12 +53,16 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         None => arguments.out.clone().unwrap_or_else(default),
     };
     let mut bars = Bars::new(global);
-    recording_size::check(&simulation, &wanted, |note| bars.note(note))?;
-    let files = RecordingFiles::reserve(&wanted, arguments.force, &inputs)?;
+    let outputs = if arguments.imu_only { Outputs::Imus } else { Outputs::All };
+    recording_size::check(&simulation, outputs, &wanted, |note| bars.note(note))?;
+    let files = RecordingFiles::reserve(&wanted, !arguments.imu_only, arguments.force, &inputs)?;
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
-    let recorded = study::record(&simulation, files.recording(), files.truth(), arguments.truth_tf, &mut watch);
+    let recorded = match files.truth() {
+        Some(truth) => study::record(&simulation, files.recording(), truth, arguments.truth_tf, &mut watch),
+        None => study::record_imus(&simulation, files.recording(), &mut watch),
+    };
     bars.finish();
     let summary = recorded.inspect_err(|_| super::full_run::print_partial_results(files.recording()))?;
     let (recording, truth) = files.finish()?;
@@ -66,9 +74,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     if let Some(object) = figures.as_object_mut() {
         object.insert("scene".to_owned(), json!(simulation.world().name()));
         object.insert("seed".to_owned(), json!(simulation.inputs().seed));
-        object.insert("truth".to_owned(), json!(truth.display().to_string()));
+        object.insert("truth".to_owned(), json!(truth.map(|truth| truth.display().to_string())));
     }
-    output::print_result(global, &text(&summary), figures, Some(folder.as_deref().unwrap_or(&recording)))?;
+    output::print_result(global, &text(&summary, outputs), figures, Some(folder.as_deref().unwrap_or(&recording)))?;
     Ok(Completion::Done)
 }
 
@@ -77,16 +85,18 @@ fn rosbag2_file(folder: &Path) -> String {
     format!("{}_0.mcap", folder.file_name().unwrap_or_default().to_string_lossy())
 }
 
-fn text(summary: &SimulationSummary) -> String {
+fn text(summary: &SimulationSummary, outputs: Outputs) -> String {
     let row = |name: &str, value: String| vec![name.to_owned(), value];
     let mut rows = vec![
         row("duration", format!("{} s", summary.duration_s)),
         row("wall time", format!("{:.2} s ({:.0} x real time)", summary.wall_s, summary.duration_s / summary.wall_s)),
-        row("scans", summary.scans.to_string()),
-        row("beams", summary.beams.to_string()),
-        row("returns", summary.returns.to_string()),
-        row("IMU samples", format!("{} ({} saturated)", summary.imu_samples, summary.imu_samples_at_limit)),
     ];
+    if outputs == Outputs::All {
+        rows.push(row("scans", summary.scans.to_string()));
+        rows.push(row("beams", summary.beams.to_string()));
+        rows.push(row("returns", summary.returns.to_string()));
+    }
+    rows.push(row("IMU samples", format!("{} ({} saturated)", summary.imu_samples, summary.imu_samples_at_limit)));
     rows.extend(summary.coil_contact.map(|contact| {
         row("coil contact", format!("from {:.2} s, for {:.2} s", contact.first_t_s, contact.contact_s))
     }));

@@ -2,7 +2,7 @@
 
 use super::motion::{MotionChunk, STEP_S};
 use super::schedule::{ImuInterval, ImuSchedule, Schedule};
-use super::{Rig, SimulationSummary};
+use super::{Outputs, Rig, SimulationSummary};
 use crate::geometry::{Pose, Vector};
 use crate::measurement::{ImuAveraging, ImuNoise, ImuSample, LidarScan};
 use crate::random::Seed;
@@ -104,6 +104,9 @@ impl<'a> Sensors<'a> {
             samples.into_iter().map(|(over_s, sample)| (self.rig.true_stamp(over_s), sample)).collect()
         };
         let (samples, base_samples) = (arrived(samples), arrived(base_samples));
+        if self.rig.outputs == Outputs::Imus {
+            return Events { samples, base_samples, until_s, ..Events::default() };
+        }
         let truths = self.schedule.truths(until_s);
         Events {
             truth: truths.iter().map(|(t_s, stamp)| self.truth(head, base, *t_s, *stamp)).collect(),
@@ -150,7 +153,7 @@ pub(super) fn measure(
     Some(events)
 }
 
-/// The scans of each of `sensors`; the rays are cast once.
+/// The scans of each of `sensors`; the rays are cast once. Empty if only the IMUs are simulated.
 fn scans(
     sensors: &mut [Sensors],
     head: &Track,
@@ -158,6 +161,9 @@ fn scans(
     until_s: f64,
     summaries: &mut [SimulationSummary],
 ) -> Vec<Vec<(Stamp, LidarScan)>> {
+    if sensors.first().is_some_and(|first| first.rig.outputs == Outputs::Imus) {
+        return Vec::new();
+    }
     let timings: Vec<Vec<ScanTiming>> = sensors.iter_mut().map(|one| one.schedule.scans(until_s)).collect();
     let (Some(first), Some(timings)) = (sensors.first(), timings.first()) else { return Vec::new() };
     let Rig { lidar, scenery, carrier, head_from_laser, .. } = *first.rig;

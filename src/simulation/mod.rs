@@ -22,7 +22,7 @@ pub use faults::{FaultKind, FaultSpec, Faults, FaultsSpec, FaultySensor, MissEnc
 pub use motion::{HeadMotion, STEP_S};
 pub use named::{Named, NamedSpec};
 pub use prepared::{Simulation, carrier_of};
-pub use rig::{EPOCH, Rig};
+pub use rig::{EPOCH, Outputs, Rig};
 pub use run::simulate;
 pub use scenario::{Run, Scenario};
 pub use summary::SimulationSummary;

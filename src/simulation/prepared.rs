@@ -1,6 +1,6 @@
 use super::faults::Injector;
 use super::run::simulate_together;
-use super::{EPOCH, Faults, Rig, Run, STEP_S, Scenario, SimulationError, SimulationSummary, simulate};
+use super::{EPOCH, Faults, Outputs, Rig, Run, STEP_S, Scenario, SimulationError, SimulationSummary, simulate};
 use crate::dynamics::{CarrierSpec, ContactWatch, DynamicsError, HeadModel, HeadSimulation, HeadSpec, HeadState};
 use crate::geometry::{Route, Vector};
 use crate::measurement::{Calibration, Sink};
@@ -111,9 +111,22 @@ impl Simulation {
         sink: &mut S,
         progress: &mut dyn FnMut(f64),
     ) -> Result<SimulationSummary, SimulationError> {
+        self.run_outputs(Outputs::All, sink, progress)
+    }
+
+    /// As [`run`](Self::run), with the given outputs only.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_outputs<S: Sink + TruthSink + ?Sized>(
+        &self,
+        outputs: Outputs,
+        sink: &mut S,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<SimulationSummary, SimulationError> {
         let mut watch = ContactWatch::new(&self.head);
         let mut motion = self.watched_motion(&mut watch)?;
-        let rig = self.rig();
+        let rig = Rig { outputs, ..self.rig() };
         let summary = match &self.faults {
             None => simulate(&rig, &mut motion, sink, progress)?,
             Some(faults) => {
@@ -192,6 +205,7 @@ impl Simulation {
             head_from_imu: *self.head.head_from_imu(),
             duration_s: self.run.duration_s,
             seed: self.run.seed,
+            outputs: Outputs::All,
         }
     }
 }

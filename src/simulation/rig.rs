@@ -9,6 +9,16 @@ use crate::time::{NANOS_PER_SECOND, Span, Stamp};
 /// recordings.
 pub const EPOCH: Stamp = Stamp::from_nanos(1_349_049_600 * NANOS_PER_SECOND);
 
+/// What a simulation passes to its sink.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Outputs {
+    /// The measurements of all sensors, and the truth.
+    #[default]
+    All,
+    /// The measurements of the IMUs only: no ray is cast. They are the same as with [`Outputs::All`].
+    Imus,
+}
+
 /// Sensors on a head, their surroundings, and the duration of the run.
 #[derive(Clone, Copy)]
 pub struct Rig<'a> {
@@ -32,6 +42,8 @@ pub struct Rig<'a> {
     pub duration_s: f64,
     /// Random seed of all errors.
     pub seed: Seed,
+    /// What is computed.
+    pub outputs: Outputs,
 }
 
 impl Rig<'_> {

@@ -69,6 +69,6 @@ pub use manifest::Manifest;
 pub use map::{MergedMap, merge_map_files};
 pub use map_options::MapOptions;
 pub use progress::{OnProgress, ProgressMonitor, Stage, StageData, StudyEvent};
-pub use record::record;
+pub use record::{record, record_imus};
 pub use result_files::{estimate_files, full_run_files};
 pub use sensor_models::{ImuNoiseSpec, LidarNoiseSpec};

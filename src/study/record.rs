@@ -4,7 +4,7 @@ use super::observed_sink::ObservedSink;
 use super::{Manifest, ProgressMonitor, Stage, StageData, StudyError};
 use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use crate::recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
-use crate::simulation::{Simulation, SimulationSummary};
+use crate::simulation::{Outputs, Simulation, SimulationSummary};
 use crate::time::Stamp;
 use crate::truth::{ClockTruth, TruthSample, TruthSink};
 use std::cell::RefCell;
@@ -29,7 +29,21 @@ pub fn record(
 ) -> Result<SimulationSummary, StudyError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
     let truth = Some(TumWriter::create(truth)?);
-    run(simulation, FileSink { recording, truth, has_truth_inside: true, stop: watch.stop }, watch)
+    run(simulation, Outputs::All, FileSink { recording, truth, has_truth_inside: true, stop: watch.stop }, watch)
+}
+
+/// Writes the measurements of the IMUs only to the MCAP file `recording`, without truth.
+///
+/// # Errors
+/// As [`record`].
+pub fn record_imus(
+    simulation: &Simulation,
+    recording: &Path,
+    watch: &mut ProgressMonitor,
+) -> Result<SimulationSummary, StudyError> {
+    let recording = Writer::create(recording, description(simulation, false)?)?;
+    let files = FileSink { recording, truth: None, has_truth_inside: false, stop: watch.stop };
+    run(simulation, Outputs::Imus, files, watch)
 }
 
 /// As [`record`], with the truth in the TUM file only.
@@ -44,17 +58,23 @@ pub(super) fn record_with_truth_apart(
 ) -> Result<(), StudyError> {
     let recording = Writer::create(recording, description(simulation, false)?)?;
     let truth = Some(TumWriter::create(truth)?);
-    run(simulation, FileSink { recording, truth, has_truth_inside: false, stop: watch.stop }, watch).map(drop)
+    let files = FileSink { recording, truth, has_truth_inside: false, stop: watch.stop };
+    run(simulation, Outputs::All, files, watch).map(drop)
 }
 
-fn run(simulation: &Simulation, files: FileSink, watch: &mut ProgressMonitor) -> Result<SimulationSummary, StudyError> {
+fn run(
+    simulation: &Simulation,
+    outputs: Outputs,
+    files: FileSink,
+    watch: &mut ProgressMonitor,
+) -> Result<SimulationSummary, StudyError> {
     let duration_s = simulation.inputs().duration_s;
     watch.data(StageData::Start { stage: Stage::Simulating, calibration: &simulation.calibration() });
     let watch = RefCell::new(watch);
     let mut progress =
         |fraction: f64| watch.borrow_mut().progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
     let mut sink = ObservedSink { sink: files, watch: &watch };
-    let ran = simulation.run(&mut sink, &mut progress);
+    let ran = simulation.run_outputs(outputs, &mut sink, &mut progress);
     sink.sink.finish()?;
     if watch.borrow().is_stopped() {
         return Err(StudyError::Stopped);

@@ -115,6 +115,23 @@ fn info_and_estimate_read_a_recording_and_report_loss_when_it_is_truncated() {
 }
 
 #[test]
+fn a_record_of_the_imu_alone_has_no_scan_no_truth_and_no_file_of_it() {
+    let here = tempfile::tempdir().unwrap();
+    let command = "simulate --scene open_field --head rigid --motion stand --duration 60s --imu-only --out a.mcap";
+    let (code, out, stderr) = run(here.path(), &format!("{command} --json"));
+    let figures: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((code, &figures["truth"], figures["beams"].as_u64()), (0, &Value::Null, Some(0)), "{stderr}");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1);
+    let (_, out, _) = run(here.path(), "info a.mcap --json");
+    let info: Value = serde_json::from_str(&out).unwrap();
+    let topics = info["topics"].as_array().unwrap().iter().map(|topic| topic["topic"].as_str().unwrap());
+    assert_eq!(topics.collect::<Vec<_>>(), ["/imu/data_raw", "/tf_static"], "{info}");
+    let (code, _, stderr) = run(here.path(), "estimate a.mcap");
+    assert!(code == 1 && stderr.contains("no lidar in the recording"), "{stderr}");
+    assert_eq!(run(here.path(), &format!("{command} --truth-tf")).0, 2);
+}
+
+#[test]
 fn the_bound_of_slam_is_above_that_of_localisation_for_any_number_of_threads() {
     let here = tempfile::tempdir().unwrap();
     run(here.path(), "simulate --scene mocap_room --duration 8s --out a.mcap");

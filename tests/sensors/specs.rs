@@ -5,7 +5,7 @@ use zsim::geometry::{Kinematics, Pose, Vector};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::{Clocks, Imu, Lidar, Scenery, SurfaceHit};
-use zsim::simulation::{EPOCH, Rig, STEP_S, simulate};
+use zsim::simulation::{EPOCH, Outputs, Rig, STEP_S, simulate};
 use zsim::spec::{Kind, find, names, parse};
 use zsim::time::Stamp;
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
@@ -78,6 +78,7 @@ fn run(lidar: &str, imu: &str, clock: &str) {
         head_from_imu: Pose::identity(),
         duration_s: DURATION_S,
         seed: Seed(1),
+        outputs: Outputs::All,
     };
     let mut recorded = MemorySink::default();
     simulate(&rig, &mut (0..).map(|step| Ok::<_, DynamicsError>(turning(step))), &mut recorded, &mut |_| ()).unwrap();

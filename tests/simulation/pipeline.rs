@@ -8,7 +8,7 @@ use zsim::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::{ClockSpec, Clocks, ClocksSpec, Cylinder, Imu, Lidar, Scenery, SurfaceHit};
-use zsim::simulation::{EPOCH, Rig, STEP_S, SimulationError, SimulationSummary, simulate};
+use zsim::simulation::{EPOCH, Outputs, Rig, STEP_S, SimulationError, SimulationSummary, simulate};
 use zsim::spec::{self, Kind, Source};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
@@ -80,11 +80,13 @@ struct Run {
     carrier: Vec<Cylinder>,
     duration_s: f64,
     seed: u64,
+    outputs: Outputs,
 }
 
 impl Run {
     fn of(lidar: &'static str, imu: &'static str, duration_s: f64) -> Self {
-        Self { lidar, imu, clocks: ClocksSpec { lidar: exact(), imu: exact() }, carrier: vec![], duration_s, seed: 1 }
+        let clocks = ClocksSpec { lidar: exact(), imu: exact() };
+        Self { lidar, imu, clocks, carrier: vec![], duration_s, seed: 1, outputs: Outputs::All }
     }
 
     fn run<S: Sink + TruthSink>(&self, sink: &mut S) -> Result<SimulationSummary, SimulationError> {
@@ -100,6 +102,7 @@ impl Run {
             head_from_imu: head_from_imu(),
             duration_s: self.duration_s,
             seed: Seed(self.seed),
+            outputs: self.outputs,
         };
         simulate(&rig, &mut Nodding { step: 0 }, sink, &mut |_| ())
     }
@@ -267,6 +270,17 @@ fn the_summary_counts_what_was_delivered() {
     assert_eq!(summary.returns, recorded.scans.iter().map(|(_, scan)| scan.returns.len() as u64).sum::<u64>());
 }
 
+#[test]
+fn an_imu_alone_has_the_samples_of_the_whole_run() {
+    let mut run = Run::of("utm30lx", "3dm_gx2", 1.7);
+    run.clocks.imu = clock(3.1, -40.0, 0.2, 0.0);
+    let whole = run.recorded();
+    run.outputs = Outputs::Imus;
+    let alone = run.recorded();
+    assert!(whole.samples.len() > 160 && alone.samples == whole.samples);
+    assert_eq!((alone.scans.len(), alone.truth.len(), alone.clocks.len()), (0, 0, 0));
+}
+
 /// Sink that fails after a hundred IMU samples.
 #[derive(Default)]
 struct Full(u32);
@@ -312,6 +326,7 @@ fn a_motion_that_ends_before_the_run_is_an_error() {
         head_from_imu: head_from_imu(),
         duration_s: 3.0,
         seed: Seed(1),
+        outputs: Outputs::All,
     };
     let mut short = Nodding { step: 0 }.take(1200);
     let error = simulate(&rig, &mut short, &mut MemorySink::default(), &mut |_| ()).unwrap_err();
