@@ -20,6 +20,7 @@ use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::sampled_truth::SampledTruth;
 use super::sensor_models::RecordedSensors;
+use super::viewer_files::write_for_result;
 use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use crate::estimation::{EstimatorSpec, Timing};
 use crate::evaluation::{Errors, MapKnowledge, Pairs};
@@ -70,8 +71,8 @@ pub struct EstimateResult {
 
 /// Estimates the trajectory from the sensors `selection` of the recording of `reader` and writes the results to `folder`.
 ///
-/// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap`, `cloud.ply` or `cloud.las`,
-/// `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and result are those of the
+/// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap` with its layout for Foxglove,
+/// `cloud.ply` or `cloud.las`, `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and result are those of the
 /// closed loop if it was computed. If the recording has the truth, the trajectory is evaluated against it; if it also has
 /// the scene, the cloud is evaluated against the surfaces.
 ///
@@ -121,6 +122,7 @@ pub(super) fn estimate_in(
     let mut bound = inputs.bound()?;
     let loops = inputs.run(bound.as_mut(), folder, watch)?;
     let (registered, bound) = inputs.register(&loops, bound, folder, watch)?;
+    write_for_result(folder)?;
     let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
 
     watch.progress(Stage::Reporting, 0.0, None);

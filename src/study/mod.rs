@@ -54,6 +54,7 @@ pub mod spring;
 pub mod sweep;
 mod true_clock;
 mod truth_cursor;
+mod viewer_files;
 
 pub use atomic_file::{replace_bytes, replace_text};
 pub use base::{base_by_imu, base_by_law};

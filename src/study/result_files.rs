@@ -2,6 +2,7 @@
 
 use super::StudyError;
 use super::atomic_file::PARTIAL_PREFIX;
+use super::viewer_files::{HEAD_MODEL, RECORDING_LAYOUT, RESULT_LAYOUT};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -21,6 +22,7 @@ pub fn estimate_files() -> Vec<String> {
         "closed_loop.tum",
         "map.ply",
         "result.mcap",
+        RESULT_LAYOUT,
         "cloud.ply",
         "cloud.las",
         "integrity.csv",
@@ -32,7 +34,7 @@ pub fn estimate_files() -> Vec<String> {
 
 /// The files that a simulation with its estimate may write to its folder, `metrics.json` first.
 pub fn full_run_files() -> Vec<String> {
-    let recording = ["recording.mcap", "truth.tum"].map(str::to_owned);
+    let recording = ["recording.mcap", "truth.tum", RECORDING_LAYOUT, HEAD_MODEL].map(str::to_owned);
     estimate_files().into_iter().chain(recording).collect()
 }
 
