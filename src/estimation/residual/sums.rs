@@ -43,6 +43,7 @@ impl<const B: usize> SurfelSums<B> {
 /// The terms of all matches of the surfels of a span, by their motion and by the common unknowns.
 #[derive(Debug)]
 pub(in crate::estimation) struct SpanSums<const B: usize> {
+    /// Up to the diagonal, by knots.
     square: [[f64; SPAN_UNKNOWNS]; SPAN_UNKNOWNS],
     by_border: [[f64; SPAN_UNKNOWNS]; B],
     right: [f64; SPAN_UNKNOWNS],
@@ -62,9 +63,9 @@ impl<const B: usize> SpanSums<B> {
     #[inline(always)]
     pub(in crate::estimation) fn add(&mut self, own: &SurfelSums<B>, basis: &Basis) {
         let square = own.square.map(|row| over_knots(&row, basis));
-        for (rows, value) in self.square.chunks_exact_mut(6).zip(basis.value) {
+        for (knot, (rows, value)) in self.square.chunks_exact_mut(6).zip(basis.value).enumerate() {
             for (sums, row) in rows.iter_mut().zip(&square) {
-                add_scaled(sums, row, value);
+                add_scaled(&mut sums[..6 * (knot + 1)], row, value);
             }
         }
         for (sums, row) in self.by_border.iter_mut().zip(&own.common) {

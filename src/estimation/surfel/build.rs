@@ -69,40 +69,38 @@ impl SurfelBuilder {
         let Some(first) = returns.first() else { return Vec::new() };
         let motion_at = |tau_s: f64| nominal.at(unknowns.clock.trajectory_s(tau_s), &unknowns.biases.gyro);
         let origin = motion_at(first.tau_s).position;
-        let edge = self.spec.finest_voxel_m;
-        let edges: &[f64] = if detail == Detail::Fine { &[edge, 0.5 * edge] } else { &[edge] };
-        let mut pairs: Vec<[Fragments; 2]> =
-            edges.iter().map(|edge| [0.0, 0.5 * edge].map(|shift| Fragments::new(origin, *edge, shift))).collect();
-        self.project(returns, nominal, unknowns, |beam, point| {
-            let noise2 = self.noise.sigma_m(f64::from(beam.range_m)).powi(2);
-            for [regular, offset] in &mut pairs {
-                regular.add(&point, beam, noise2);
-                if self.spec.offset_grids {
-                    offset.add(&point, beam, noise2);
-                }
-            }
-        });
+        let edge_m = self.spec.finest_voxel_m;
+        let edges_m: &[f64] = if detail == Detail::Fine { &[edge_m, 0.5 * edge_m] } else { &[edge_m] };
+        let shifts = if self.spec.offset_grids { 2 } else { 1 };
+        let points = self.project(returns, nominal, unknowns);
+        let fragments: Vec<Vec<Fragment>> = (0..edges_m.len() * shifts)
+            .into_par_iter()
+            .map(|k| {
+                let (edge_m, shift) = (edges_m[k / shifts], 0.5 * (k % shifts) as f64);
+                self.fragments(returns, &points, &origin, (edge_m, shift * edge_m))
+            })
+            .collect();
         let min_points = if detail == Detail::Fine { self.spec.fine.min_points } else { self.spec.min_points };
         let surfels_of = |grid: &Grid| -> Vec<SurfelThickness> {
             let cells = merge_by_cell(grid, &self.spec, min_points);
             let fit = |cell| self.fit_surfel(cell, grid.level, &origin, &unknowns.lidar, motion_at);
             cells.iter().filter_map(fit).collect()
         };
-        let pairs: Vec<[&[Fragment]; 2]> =
-            pairs.iter_mut().map(|pair| pair.each_mut().map(Fragments::finish)).collect();
-        let shaped: Vec<Vec<SurfelThickness>> = self.grids(&pairs).par_iter().map(surfels_of).collect();
+        let shaped: Vec<Vec<SurfelThickness>> = self.grids(&fragments).par_iter().map(surfels_of).collect();
         flatness::add_roughness_variance(shaped.concat(), &self.spec)
     }
 
-    /// The grids of all resolutions, of the `[regular, offset]` fragments of the usual and, if there are any, the fine voxels.
-    fn grids<'a>(&self, fragments: &[[&'a [Fragment]; 2]]) -> Vec<Grid<'a>> {
+    /// The grids of all resolutions, of the regular and, if there are any, offset fragments of the usual and, if there are any, the
+    /// fine voxels.
+    fn grids<'a>(&self, fragments: &'a [Vec<Fragment>]) -> Vec<Grid<'a>> {
+        let shifts = if self.spec.offset_grids { 2 } else { 1 };
         let usual = (0..self.spec.levels).map(|level| (0, level, level));
-        let fine = (1..fragments.len()).map(|pair| (pair, 0, FINE));
+        let fine = (1..fragments.len() / shifts).map(|edge| (edge, 0, FINE));
         let mut grids = Vec::new();
-        for (pair, doublings, level) in usual.chain(fine) {
-            let [regular, offset] = fragments[pair];
-            grids.push(Grid { fragments: regular, doublings, shift: 0, level });
-            if self.spec.offset_grids {
+        for (edge, doublings, level) in usual.chain(fine) {
+            let of_edge = &fragments[edge * shifts..(edge + 1) * shifts];
+            grids.push(Grid { fragments: &of_edge[0], doublings, shift: 0, level });
+            if let [regular, offset] = of_edge {
                 // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
                 let (fragments, shift) = if doublings == 0 { (offset, 0) } else { (regular, 1 << (doublings - 1)) };
                 grids.push(Grid { fragments, doublings, shift, level });
@@ -111,35 +109,63 @@ impl SurfelBuilder {
         grids
     }
 
-    /// Calls `with` for each return and the point in the map, m.
+    /// The point of each return in the map, m.
     fn project(
         &self,
         returns: &[TimedReturn],
         nominal: &Nominal,
         Unknowns { biases, clock, lidar, .. }: &Unknowns,
-        mut with: impl FnMut(&TimedReturn, Vector),
-    ) {
+    ) -> Vec<Vector> {
         let mut cursor = 0;
         let mut pose = |tau_s: f64| nominal.at_cursor(&mut cursor, clock.trajectory_s(tau_s), &biases.gyro);
-        let mut start_s = f64::NEG_INFINITY;
-        let mut end_s = f64::NEG_INFINITY;
-        let mut ends: Option<(Motion, Motion)> = None;
+        let mut runs: Vec<(&[TimedReturn], [Motion; 2])> = Vec::new();
+        let mut rest = returns;
+        while let Some(first) = rest.first() {
+            let end_s = first.tau_s + POSE_SPACING_S;
+            let count = rest.iter().position(|beam| beam.tau_s >= end_s).unwrap_or(rest.len());
+            let (run, later) = rest.split_at(count.max(1));
+            runs.push((run, [pose(first.tau_s), pose(end_s)]));
+            rest = later;
+        }
         let lidar_rotation = lidar.rotation.to_rotation_matrix();
         let laser_in_imu = self.laser_in_imu + lidar.translation;
-        for beam in returns {
-            if beam.tau_s >= end_s || ends.is_none() {
-                start_s = beam.tau_s;
-                end_s = start_s + POSE_SPACING_S;
-                ends = Some((pose(start_s), pose(end_s)));
+        let points = |(run, [a, b]): &(&[TimedReturn], [Motion; 2])| -> Vec<Vector> {
+            let point = |beam: &TimedReturn| {
+                let x = (beam.tau_s - run[0].tau_s) / POSE_SPACING_S;
+                let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
+                let position = a.position.lerp(&b.position, x);
+                let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
+                let ray = lidar_rotation * (ray * (1.0 + lidar.range_m / f64::from(beam.range_m)));
+                rotation * (laser_in_imu + ray) + position
+            };
+            run.iter().map(point).collect()
+        };
+        runs.par_iter().with_min_len(128).flat_map_iter(points).collect()
+    }
+
+    /// The fragments of the returns at `points` in a grid of cells of `edge_m`, offset by `shift_m`, in order of time.
+    fn fragments(
+        &self,
+        returns: &[TimedReturn],
+        points: &[Vector],
+        origin: &Vector,
+        (edge_m, shift_m): (f64, f64),
+    ) -> Vec<Fragment> {
+        let per_edge = 1.0 / edge_m;
+        let mut fragments: Vec<Fragment> = Vec::new();
+        for (beam, point) in returns.iter().zip(points) {
+            let noise2 = self.noise.sigma_m(f64::from(beam.range_m)).powi(2);
+            let cell = [point.x, point.y, point.z].map(|x| ((x + shift_m) * per_edge).floor() as i32);
+            if fragments.last().is_none_or(|last| last.cell != cell) {
+                let moments = Moments::default();
+                fragments.push(Fragment { cell, first_s: beam.tau_s, last_s: beam.tau_s, moments });
             }
-            let Some((a, b)) = &ends else { continue };
-            let x = (beam.tau_s - start_s) / POSE_SPACING_S;
-            let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
-            let position = a.position.lerp(&b.position, x);
-            let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
-            let ray = lidar_rotation * (ray * (1.0 + lidar.range_m / f64::from(beam.range_m)));
-            with(beam, rotation * (laser_in_imu + ray) + position);
+            if let Some(current) = fragments.last_mut() {
+                current.moments.add(&(point - origin), beam, noise2);
+                current.last_s = beam.tau_s;
+            }
         }
+        fragments
     }
 
     /// Fits a surfel to a cell's points; `None` if they are not planar, too thick, or badly observed.
@@ -199,39 +225,6 @@ impl SurfelBuilder {
             variance: l1,
             noise_variance: flatness::noise_across(moments.mean_noise2(), normal.dot(&beam)),
         })
-    }
-}
-
-/// Collects the fragments of one grid in time order.
-struct Fragments {
-    origin: Vector,
-    per_edge: f64,
-    shift: f64,
-    done: Vec<Fragment>,
-    current: Option<Fragment>,
-}
-
-impl Fragments {
-    fn new(origin: Vector, edge_m: f64, shift_m: f64) -> Self {
-        Self { origin, per_edge: 1.0 / edge_m, shift: shift_m, done: Vec::new(), current: None }
-    }
-
-    fn add(&mut self, point: &Vector, beam: &TimedReturn, noise2: f64) {
-        let cell = [point.x, point.y, point.z].map(|x| ((x + self.shift) * self.per_edge).floor() as i32);
-        if let Some(current) = self.current.as_mut().filter(|f| f.cell == cell) {
-            current.moments.add(&(point - self.origin), beam, noise2);
-            current.last_s = beam.tau_s;
-            return;
-        }
-        let mut fragment = Fragment { cell, first_s: beam.tau_s, last_s: beam.tau_s, moments: Moments::default() };
-        fragment.moments.add(&(point - self.origin), beam, noise2);
-        self.done.extend(self.current.replace(fragment));
-    }
-
-    /// Closes the current fragment and returns all of them.
-    fn finish(&mut self) -> &[Fragment] {
-        self.done.extend(self.current.take());
-        &self.done
     }
 }
 
