@@ -1,11 +1,12 @@
 # The command zsim in an image:
-#   docker build -t zsim . && docker run --rm -v "$PWD:/data" zsim --scene office --out results/office
+#   docker build -t zsim .
+#   docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/data" zsim --scene office --out results/office
 FROM rust:1.89-bookworm AS build
 WORKDIR /zsim
 COPY . .
 RUN cargo build --release --locked --config profile.release.strip=true
 
-FROM gcr.io/distroless/cc-debian12
+FROM gcr.io/distroless/cc-debian12:nonroot
 COPY --from=build /zsim/target/release/zsim /usr/local/bin/zsim
 COPY --from=build /zsim/LICENSE-APACHE /zsim/LICENSE-MIT /usr/share/doc/zsim/
 WORKDIR /data
