@@ -93,15 +93,12 @@ impl Comparison {
 
     /// Goal, median, worst, ratio to the paper and verdict as cells of a table; empty where there is none.
     pub(super) fn cells(&self) -> [String; 5] {
-        let number = |x: f64| {
-            let decimals = if x.abs() >= 100.0 { 0 } else { 2 };
-            format!("{x:.decimals$} {}", self.unit).trim_end().to_owned()
-        };
+        let number = |x: f64| with_unit(x, &self.unit);
         [
             self.goal.clone(),
             number(self.median),
             self.worst.map_or_else(String::new, number),
-            self.ratio().map_or_else(String::new, |ratio| format!("{ratio:.2}")),
+            self.ratio().filter(|ratio| ratio.is_finite()).map_or_else(String::new, |ratio| format!("{ratio:.2}")),
             self.verdict.name().to_owned(),
         ]
     }
@@ -112,9 +109,31 @@ impl Comparison {
     }
 }
 
+/// A number with its unit, which may be empty.
+pub(super) fn with_unit(x: f64, unit: &str) -> String {
+    let unit = if x.is_finite() { unit } else { "" };
+    format!("{} {unit}", rounded(x)).trim_end().to_owned()
+}
+
+/// Three significant digits; an infinite number is that of a run without a result.
+pub(super) fn rounded(x: f64) -> String {
+    if x.is_infinite() {
+        return "no result".to_owned();
+    }
+    let digits = if x != 0.0 && x.is_finite() { x.abs().log10().floor() } else { 0.0 };
+    let decimals = (2.0 - digits).clamp(0.0, 6.0) as usize;
+    format!("{x:.decimals$}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_have_three_significant_digits() {
+        assert_eq!([0.01234, 1.0, 56.78, 1234.5, 0.0].map(rounded), ["0.0123", "1.00", "56.8", "1234", "0.00"]);
+        assert_eq!([2.0, f64::INFINITY].map(|x| with_unit(x, "mm")), ["2.00 mm", "no result"]);
+    }
 
     #[test]
     fn a_result_is_compared_with_the_paper_or_the_goal() {

@@ -1,5 +1,6 @@
 //! Experiments whose results are measures of the runs of a study.
 
+use super::comparison::{rounded, with_unit};
 use super::spec::{ClaimSpec, ResultSpec, RunsSpec, WarningSpec};
 use super::{ComparedNumber, Comparison, ExperimentResult, clock_plot};
 use crate::study::StudyError;
@@ -59,18 +60,11 @@ fn compared(result: &ResultSpec, sweep: &Sweep) -> Result<ComparedNumber, StudyE
 }
 
 fn in_words(of: &Comparison, seeds: usize) -> String {
-    let median = format!("{} {}", rounded(of.median), of.unit);
+    let median = with_unit(of.median, &of.unit);
     match of.worst {
-        Some(worst) => format!("{}, worst {} of {seeds} runs", median.trim_end(), rounded(worst)),
-        None => format!("{}, one run", median.trim_end()),
+        Some(worst) => format!("{median}, worst {} of {seeds} runs", rounded(worst)),
+        None => format!("{median}, one run"),
     }
-}
-
-/// Three significant digits.
-fn rounded(x: f64) -> String {
-    let digits = if x != 0.0 && x.is_finite() { x.abs().log10().floor() } else { 0.0 };
-    let decimals = (2.0 - digits).clamp(0.0, 6.0) as usize;
-    format!("{x:.decimals$}")
 }
 
 /// The ratio of the medians of two levels, which the paper states to be below 1.
@@ -150,10 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_three_significant_digits() {
-        assert_eq!([0.01234, 1.0, 56.78, 1234.5, 0.0].map(rounded), ["0.0123", "1.00", "56.8", "1234", "0.00"]);
-        assert_eq!(rounded(f64::INFINITY), "inf");
-        // A ratio has no unit.
+    fn a_ratio_has_no_unit() {
         let ratio = Comparison::at_most(display_unit(Measure::CloudOverTruth).0, None, 1.02, &[1.0, 1.01]).unwrap();
         assert_eq!((in_words(&ratio, 2).as_str(), ratio.goal.as_str()), ("1.00, worst 1.01 of 2 runs", "at most 1.02"));
     }
