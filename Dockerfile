@@ -6,7 +6,9 @@ WORKDIR /zsim
 COPY . .
 RUN cargo build --release --locked --config profile.release.strip=true
 
-FROM gcr.io/distroless/cc-debian12:nonroot
+# Distroless images have no version tags. As root, because the folders that clusters mount often belong to it.
+# hadolint ignore=DL3007
+FROM gcr.io/distroless/cc-debian12:latest
 COPY --from=build /zsim/target/release/zsim /usr/local/bin/zsim
 COPY --from=build /zsim/LICENSE-APACHE /zsim/LICENSE-MIT /usr/share/doc/zsim/
 WORKDIR /data

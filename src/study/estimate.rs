@@ -72,9 +72,9 @@ pub struct EstimateResult {
 /// Estimates the trajectory from the sensors `selection` of the recording of `reader` and writes the results to `folder`.
 ///
 /// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap` with its layout for Foxglove,
-/// `cloud.ply` or `cloud.las`, `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and result are those of the
-/// closed loop if it was computed. If the recording has the truth, the trajectory is evaluated against it; if it also has
-/// the scene, the cloud is evaluated against the surfaces.
+/// `cloud.ply` or `cloud.las`, `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and
+/// result are those of the closed loop if it was computed. If the recording has the truth, the trajectory is evaluated
+/// against it; if it also has the scene, the cloud is evaluated against the surfaces.
 ///
 /// Files of these names from an earlier run are removed first. `metrics.json` is written last: a folder without it is
 /// incomplete.
