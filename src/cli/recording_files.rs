@@ -39,6 +39,11 @@ impl RecordingFiles {
         if !(force && outputs.iter().any(|path| path.exists())) {
             return Self::first_free(wanted, truth, None);
         }
+        ensure!(
+            truth || !truth_of(wanted).exists(),
+            "{} next to it is the true trajectory of another recording: choose another --out",
+            truth_of(wanted).display()
+        );
         for path in &outputs {
             ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
         }
@@ -47,17 +52,20 @@ impl RecordingFiles {
         Self::first_free(&wanted.with_extension(format!("partial{ending}")), truth, Some(wanted))
     }
 
-    /// Creates the files under the first name, `wanted` or `wanted` with a number, that neither of them has taken.
+    /// Creates the files under the first name, `wanted` or `wanted` with a number, that neither a recording nor a true
+    /// trajectory has taken.
     ///
     /// [`finish`](Self::finish) then moves them to `replaces`, if given.
     fn first_free(wanted: &Path, truth: bool, replaces: Option<&Path>) -> anyhow::Result<Self> {
         for recording in candidates(wanted) {
-            let truth = truth.then(|| truth_of(&recording));
+            let truth_file = truth_of(&recording);
             if !is_created(&recording)? {
                 continue;
             }
-            if truth.as_deref().map_or(Ok(true), is_created)? {
-                return Ok(Self { recording, truth, replaces: replaces.map(Path::to_owned), is_finished: false });
+            let is_free = if truth { is_created(&truth_file)? } else { !truth_file.exists() };
+            if is_free {
+                let (truth, replaces) = (truth.then_some(truth_file), replaces.map(Path::to_owned));
+                return Ok(Self { recording, truth, replaces, is_finished: false });
             }
             std::fs::remove_file(&recording).with_context(|| format!("{} cannot be removed", recording.display()))?;
         }
@@ -132,7 +140,12 @@ mod tests {
         drop((first, second));
         assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1, "empty files are removed");
         let without_truth = RecordingFiles::reserve(&wanted, false, false, &[]).unwrap();
-        assert_eq!((without_truth.recording(), without_truth.truth()), (wanted.as_path(), None));
+        assert_eq!(
+            (without_truth.recording(), without_truth.truth()),
+            (here.path().join("run-2.mcap").as_path(), None)
+        );
+        std::fs::write(&wanted, "old").unwrap();
+        assert!(RecordingFiles::reserve(&wanted, false, true, &[]).is_err(), "the truth next to it is another's");
         assert!(RecordingFiles::reserve(&here.path().join("y.tum"), true, true, &[]).is_err());
         assert!(RecordingFiles::reserve(Path::new(""), true, false, &[]).is_err());
     }
