@@ -1,25 +1,61 @@
 //! Output of final poses, which later windows do not change.
 
 use super::Estimator;
-use super::phase::Tracking;
+use super::phase::{Phase, Tracking};
 use crate::estimation::EstimatedPose;
 use crate::estimation::window::Window;
 use crate::geometry::{Pose, Rotation};
 use crate::time::{Span, Stamp};
 
 impl Estimator {
+    /// The poses after `after` up to the end of the window, at whole multiples of the IMU period, as estimated so far.
+    ///
+    /// Later windows change them; [`Self::take_poses`] returns them when they are final. None before the first window, and
+    /// none while the estimate has lost its place after a gap.
+    pub fn newest_poses(&self, after: Option<Stamp>) -> Vec<EstimatedPose> {
+        let Phase::Tracking(tracking) = &self.phase else { return Vec::new() };
+        if self.phase.awaits_relocalisation() {
+            return Vec::new();
+        }
+        let window = &tracking.window;
+        let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
+        let first = after.unwrap_or_else(|| self.intake.stamp(window.unknowns.clock.lidar_s(first_u_s)));
+        let mut stamp = self.multiple_after(first);
+        let mut poses = Vec::new();
+        loop {
+            let tau_s = stamp.seconds_since(self.intake.origin());
+            let u_s = window.unknowns.clock.trajectory_s(tau_s);
+            if u_s.is_nan() || u_s > window.nominal.end_s() {
+                return poses;
+            }
+            if u_s >= first_u_s {
+                poses.push(self.pose_at(window, stamp, tau_s, u_s));
+            }
+            stamp += self.pose_period();
+        }
+    }
+
+    /// Time between poses: the IMU period in whole milliseconds.
+    fn pose_period(&self) -> Span {
+        Span::from_nanos(self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000)
+    }
+
+    /// The first multiple of the period of poses after `stamp`.
+    fn multiple_after(&self, stamp: Stamp) -> Stamp {
+        let period_ns = self.pose_period().nanos();
+        Stamp::from_nanos((stamp.nanos().div_euclid(period_ns) + 1) * period_ns)
+    }
+
     /// Outputs the poses up to `until_u_s` (trajectory time) at whole multiples of the IMU period.
     pub(super) fn output_poses(&mut self, tracking: &mut Tracking, until_u_s: f64) {
         let window = &tracking.window;
-        let period_ns = self.intake.imu_period_s().map_or(10, |s| (s * 1e3).round().max(1.0) as i64) * 1_000_000;
         let first_u_s = window.nominal.times_s().first().copied().unwrap_or(f64::INFINITY);
-        let mut stamp = tracking.next_pose.unwrap_or_else(|| {
-            let start_ns = self.intake.stamp(window.unknowns.clock.lidar_s(first_u_s)).nanos();
-            Stamp::from_nanos((start_ns.div_euclid(period_ns) + 1) * period_ns)
-        });
+        let mut stamp = tracking
+            .next_pose
+            .unwrap_or_else(|| self.multiple_after(self.intake.stamp(window.unknowns.clock.lidar_s(first_u_s))));
         // After a gap the window may start before the last pose; the stamps must still increase strictly.
         if let Some(last) = self.newest_pose.filter(|last| stamp <= *last) {
-            stamp = Stamp::from_nanos((last.nanos().div_euclid(period_ns) + 1) * period_ns);
+            stamp = self.multiple_after(last);
         }
         loop {
             let tau_s = stamp.seconds_since(self.intake.origin());
@@ -29,7 +65,7 @@ impl Estimator {
             }
             self.poses.push(self.pose_at(window, stamp, tau_s, u_s));
             self.newest_pose = Some(stamp);
-            stamp += Span::from_nanos(period_ns);
+            stamp += self.pose_period();
         }
         tracking.next_pose = Some(stamp);
     }
