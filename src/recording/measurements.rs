@@ -1,14 +1,14 @@
 //! Reads a recording's measurements sequentially, without ground truth.
 
 use crate::measurement::{ImuSample, LidarScan, Measurement};
-use crate::recording::container::{ChannelId, Messages, RawMessage};
+use crate::recording::container::{ChannelId, Messages};
 use crate::recording::duplicates::DuplicateFilter;
 use crate::recording::message::scan::Projector;
 use crate::recording::message::{imu, livox, multi_echo, points, scan};
 use crate::recording::pairing::ImuPairing;
 use crate::recording::selection::{ImuDecoding, ImuLayout, LidarDecoding, LidarKind};
 use crate::recording::stamp_sorter::StampSorter;
-use crate::recording::wire::DecodeError;
+use crate::recording::wire::{DecodeError, Payload};
 use crate::recording::{Loss, Reader, RecordingError, Selection};
 
 /// Reads measurements in order of their stamps, independent of log times.
@@ -31,8 +31,17 @@ pub struct Measurements<'r> {
     ended: bool,
 }
 
+/// Sensor of a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Lidar,
+    Imu,
+    /// Accelerations that have their own topic.
+    Acceleration,
+}
+
 /// Converts messages to measurements.
-struct MeasurementDecoder {
+pub(super) struct MeasurementDecoder {
     lidar: LidarDecoding,
     imu: ImuDecoding,
     projector: Projector,
@@ -42,21 +51,13 @@ struct MeasurementDecoder {
 impl Reader {
     /// Reads the measurements of the selected sensors, in order of their stamps.
     pub fn measurements(&self, selection: &Selection) -> Measurements<'_> {
-        let accelerations = match &selection.imu.layout {
-            ImuLayout::Separate { acceleration_topic: Some(topic), .. } => self.ids_of(topic),
-            _ => Vec::new(),
-        };
+        let accelerations = selection.acceleration_topic().map_or_else(Vec::new, |topic| self.ids_of(topic));
         Measurements {
             messages: self.messages(),
             lidar: self.ids_of(&selection.lidar_topic),
             imu: self.ids_of(&selection.imu_topic),
             accelerations,
-            decoder: MeasurementDecoder {
-                lidar: selection.lidar,
-                imu: selection.imu.clone(),
-                projector: Projector::default(),
-                pairing: ImuPairing::default(),
-            },
+            decoder: MeasurementDecoder::new(selection),
             loss: self.loss().clone(),
             expected: self.expected_messages(),
             sorter: StampSorter::default(),
@@ -71,12 +72,12 @@ impl LidarDecoding {
     ///
     /// # Errors
     /// When the bytes do not match the lidar's message type.
-    pub fn decode(&self, message: &RawMessage<'_>, projector: &mut Projector) -> Result<LidarScan, DecodeError> {
+    pub fn decode(&self, message: Payload<'_>, projector: &mut Projector) -> Result<LidarScan, DecodeError> {
         let (stamp, planar) = match self.kind {
-            LidarKind::Points => return points::decode(message.data, self.time_unit, self.no_return_range_m),
-            LidarKind::Livox => return livox::decode(message.data, self.no_return_range_m),
-            LidarKind::Scan => scan::decode(message.data)?,
-            LidarKind::MultiEcho => multi_echo::decode(message.data)?,
+            LidarKind::Points => return points::decode(message, self.time_unit, self.no_return_range_m),
+            LidarKind::Livox => return livox::decode(message, self.no_return_range_m),
+            LidarKind::Scan => scan::decode(message)?,
+            LidarKind::MultiEcho => multi_echo::decode(message)?,
         };
         Ok(projector.project(stamp, planar, self.no_return_range_m))
     }
@@ -88,34 +89,54 @@ impl Measurements<'_> {
         &self.loss
     }
 
-    /// Reads one message of the sensors and queues its measurement; `false` at the end of the recording.
+    /// Reads one message of the sensors and queues its measurement, if it has one; `false` at the end of the recording.
     fn step(&mut self) -> Result<bool, RecordingError> {
         loop {
             let Some(message) = self.messages.next()? else {
                 self.loss.add_pass(&self.messages, self.expected);
                 return Ok(false);
             };
-            let is_imu = self.imu.contains(&message.channel);
-            if is_imu || self.accelerations.contains(&message.channel) {
-                match imu::decode(message.data, self.decoder.imu.unit) {
-                    Ok(sample) if !imu::is_finite(&sample) => self.loss.samples_not_finite += 1,
-                    Ok(sample) => self.decoder.imu_sample(sample, is_imu, &mut self.sorter),
-                    Err(_) => self.loss.unreadable_messages += 1,
-                }
+            let role = if self.imu.contains(&message.channel) {
+                Role::Imu
+            } else if self.accelerations.contains(&message.channel) {
+                Role::Acceleration
             } else if self.lidar.contains(&message.channel) {
-                match self.decoder.lidar.decode(&message, &mut self.decoder.projector) {
-                    Ok(scan) => self.sorter.put(Measurement::Lidar(scan)),
-                    Err(_) => self.loss.unreadable_messages += 1,
-                }
+                Role::Lidar
             } else {
                 continue;
-            }
+            };
+            self.decoder.take(role, message.data, &mut self.sorter, &mut self.loss);
             return Ok(true);
         }
     }
 }
 
 impl MeasurementDecoder {
+    pub(super) fn new(selection: &Selection) -> Self {
+        Self {
+            lidar: selection.lidar,
+            imu: selection.imu.clone(),
+            projector: Projector::default(),
+            pairing: ImuPairing::default(),
+        }
+    }
+
+    /// Decodes a message and queues its measurement; a message that is not usable is counted.
+    pub(super) fn take(&mut self, role: Role, message: Payload<'_>, sorter: &mut StampSorter, loss: &mut Loss) {
+        if role == Role::Lidar {
+            match self.lidar.decode(message, &mut self.projector) {
+                Ok(scan) => sorter.put(Measurement::Lidar(scan)),
+                Err(_) => loss.unreadable_messages += 1,
+            }
+            return;
+        }
+        match imu::decode(message, self.imu.unit) {
+            Ok(sample) if !imu::is_finite(&sample) => loss.samples_not_finite += 1,
+            Ok(sample) => self.imu_sample(sample, role == Role::Imu, sorter),
+            Err(_) => loss.unreadable_messages += 1,
+        }
+    }
+
     /// Processes a message of the IMU topic (`is_imu`) or of the acceleration topic.
     fn imu_sample(&mut self, mut sample: ImuSample, is_imu: bool, sorter: &mut StampSorter) {
         sample.stamp += self.imu.shift;

@@ -21,14 +21,19 @@
 //! [`TumWriter`] and [`read_tum`] handle trajectories, [`PlyWriter`], [`PlyReader`] and [`LasWriter`] point clouds,
 //! [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`write_result`] writes an estimate as a recording for
 //! viewers, [`write_rosbag2_metadata`] the metadata of a folder of rosbag2.
+//!
+//! On a running robot [`Incoming`] decodes messages as they arrive, [`ReceivedWriter`] records them, and
+//! [`EstimateMessages`] encodes the estimate.
 
 mod base_imu;
 mod cloud;
 mod container;
 mod duplicates;
 mod error;
+mod estimate_messages;
 mod extrinsics;
 mod folder;
+mod incoming;
 mod info;
 mod las;
 mod loss;
@@ -37,9 +42,11 @@ mod mcap_writer;
 mod measurements;
 mod message;
 mod pairing;
+mod playback;
 mod ply;
 mod poses;
 mod reader;
+mod received;
 mod result;
 mod rosbag2;
 mod schema;
@@ -54,14 +61,18 @@ mod writer;
 pub use base_imu::BaseImuRecord;
 pub use cloud::CloudPoint;
 pub use error::RecordingError;
+pub use estimate_messages::{Diagnostic, DiagnosticLevel, EstimateMessages, EstimateTopic};
 pub use extrinsics::FoundCalibration;
+pub use incoming::Incoming;
 pub use info::{ClockStatistics, RecordingInfo, TopicInfo};
 pub use las::LasWriter;
 pub use loss::Loss;
 pub use map::{parse_surfel_map, read_surfel_map, write_surfel_map};
 pub use measurements::Measurements;
+pub use playback::RecordedMessage;
 pub use ply::{PlyReader, PlyWriter};
 pub use reader::Reader;
+pub use received::ReceivedWriter;
 pub use result::write_result;
 pub use rosbag2::write_rosbag2_metadata;
 pub use selection::{Selection, TopicPreference};

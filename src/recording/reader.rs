@@ -3,6 +3,7 @@
 use crate::recording::container::{Block, Channel, ChannelId, Messages, RawMessage, RecordingFile};
 use crate::recording::folder::list_files;
 use crate::recording::{Loss, RecordingError};
+use crate::time::Stamp;
 use std::io::{Read, Seek};
 use std::path::Path;
 
@@ -61,6 +62,14 @@ impl Reader {
     /// Damaged chunks show only when they are read: each pass counts those that it encounters.
     pub fn loss(&self) -> &Loss {
         &self.loss
+    }
+
+    /// Log times of the first message and of the beginning of the last block; `None` without messages.
+    pub fn log_span(&self) -> Option<(Stamp, Stamp)> {
+        let stamp = |ns: u64| Stamp::from_nanos(i64::try_from(ns).unwrap_or(i64::MAX));
+        let first = self.blocks().map(|(_, block)| block.start_ns).min()?;
+        let last = self.blocks().map(|(_, block)| block.start_ns).max()?;
+        Some((stamp(first), stamp(last)))
     }
 
     /// Total size of the files, bytes.

@@ -111,6 +111,22 @@ impl MessageType {
         }
     }
 
+    /// The type of this name; `None` if zsim has no definition of it.
+    pub fn named(name: &str) -> Option<Self> {
+        let all = [
+            Self::LaserScan,
+            Self::PointCloud2,
+            Self::Imu,
+            Self::TimeReference,
+            Self::Transforms,
+            Self::Odometry,
+            Self::Path,
+            Self::PoseStamped,
+            Self::PoseWithCovariance,
+        ];
+        all.into_iter().find(|kind| kind.is_named(name))
+    }
+
     /// Whether `name` denotes this type; some writers omit `msg`.
     pub fn is_named(self, name: &str) -> bool {
         let full = self.name();

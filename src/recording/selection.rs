@@ -48,6 +48,14 @@ impl Selection {
     pub fn imu_shift(&self) -> Span {
         self.imu.shift
     }
+
+    /// Topic of the accelerations, if it is not that of the angular velocities.
+    pub fn acceleration_topic(&self) -> Option<&str> {
+        match &self.imu.layout {
+            ImuLayout::Separate { acceleration_topic, .. } => acceleration_topic.as_deref(),
+            ImuLayout::Combined => None,
+        }
+    }
 }
 
 /// How to decode a lidar's messages.
@@ -194,7 +202,7 @@ impl Reader {
             if !ids.contains(&message.channel) {
                 continue;
             }
-            if let Ok(scan) = reading.decode(&message, &mut projector) {
+            if let Ok(scan) = reading.decode(message.data, &mut projector) {
                 let last = scan.returns.last().map_or(Span::ZERO, |last| last.offset);
                 durations_s.push((last - scan.stamped_after).seconds());
             }

@@ -1,6 +1,6 @@
 //! Writes the recording of a simulated run.
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, PoseCovariance};
 use crate::measurement::{Calibration, ImuNoise, ImuSample, LidarScan, Sink, SinkError};
 use crate::recording::RecordingError;
 use crate::recording::mcap_writer::McapWriter;
@@ -131,7 +131,10 @@ impl Writer {
         }
         self.next_odometry = now.floor_to(ODOMETRY_PERIOD) + ODOMETRY_PERIOD;
         let child = topics::TRUTH_HEAD;
-        self.mcap.message(Topic::TruthOdometry, now, |out| pose::encode_odometry(out, frame, child, stamp, head))?;
+        // The truth has no covariance.
+        let head_exactly = (head, &PoseCovariance::zeros());
+        self.mcap
+            .message(Topic::TruthOdometry, now, |out| pose::encode_odometry(out, frame, child, stamp, head_exactly))?;
         if !self.run.truth_tf {
             return Ok(());
         }

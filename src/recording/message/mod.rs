@@ -1,6 +1,7 @@
 //! Messages of a recording, one file per kind: encoding and decoding.
 
 pub mod clock;
+pub mod diagnostics;
 pub mod imu;
 pub mod livox;
 pub mod multi_echo;

@@ -54,7 +54,7 @@ pub fn decode_odometry(message: Payload<'_>) -> Result<(Stamp, Pose), DecodeErro
     Ok((stamp, input.pose()?))
 }
 
-/// Encodes an `Odometry`: the pose in `frame`, the twist in the moving frame `child`.
+/// Encodes an `Odometry`: the pose in `frame`, with its covariance, the twist in the moving frame `child`.
 ///
 /// # Errors
 /// When the stamp does not fit into a message.
@@ -63,12 +63,13 @@ pub fn encode_odometry(
     frame: &str,
     child: &str,
     stamp: Stamp,
-    body: &Kinematics,
+    (body, covariance): (&Kinematics, &PoseCovariance),
 ) -> Result<(), RecordingError> {
     out.header(stamp, frame)?;
     out.string(child)?;
     out.pose(&body.world_from_body);
-    out.f64s(&[0.0; 36]);
+    // The message is row-major, the slice column-major; the matrix is symmetric.
+    out.f64s(covariance.as_slice());
     out.vector(&(body.world_from_body.rotation.inverse() * body.velocity_in_world));
     out.vector(&body.angular_velocity_in_body());
     out.f64s(&[0.0; 36]);
@@ -110,7 +111,14 @@ mod tests {
             ..Kinematics::at_rest(pose)
         };
         let mut bytes = Vec::new();
-        encode_odometry(&mut Encoder::new(&mut bytes), "map", "head", Stamp::from_nanos(5), &body).unwrap();
+        encode_odometry(
+            &mut Encoder::new(&mut bytes),
+            "map",
+            "head",
+            Stamp::from_nanos(5),
+            (&body, &PoseCovariance::zeros()),
+        )
+        .unwrap();
         let mut input = Decoder::new(Payload::cdr(&bytes)).unwrap();
         assert_eq!(input.header().unwrap(), (Stamp::from_nanos(5), "map"));
         assert_eq!(input.string().unwrap(), "head");
