@@ -78,6 +78,9 @@ const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
 /// Crates of the Python package: the library, and what converts its values.
 const PYTHON_CRATES: [&str; 7] = ["zsim", "numpy", "pyo3", "serde", "serde_json", "tempfile", "std"];
 
+/// Crates and own modules of the program that connects to DDS: it passes messages and knows nothing of zsim.
+const ROS2_CRATES: [&str; 8] = ["bytes", "futures", "rustdds", "std", "frame", "names", "node", "raw"];
+
 /// Maximum length of a file of the Python package, lines; it converts values and computes nothing.
 const MAX_PYTHON_FILE: usize = 250;
 
@@ -317,4 +320,25 @@ fn the_check_finds_computations_in_the_python_package() {
     assert_eq!(python_violations("use rapier3d_f64::prelude::RigidBody;"), ["rapier3d_f64"]);
     assert_eq!(python_violations("fn f(x: f64) -> f64 { x.sqrt() }"), [".sqrt()"]);
     assert_eq!(python_violations(&"\n".repeat(251)), ["more than 250 lines"]);
+}
+
+#[test]
+fn the_program_for_ros_2_passes_messages_and_does_not_use_the_library() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("ros2/src");
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let others: Vec<_> =
+            crates_used(&text).into_iter().filter(|name| !ROS2_CRATES.contains(&name.as_str())).collect();
+        assert!(others.is_empty(), "{}: {}", path.display(), others.join(", "));
+        assert!(text.lines().count() < 250, "{} is long for a program that passes messages", path.display());
+        files += 1;
+    }
+    assert!(files > 2, "the folder has moved");
+    let frames = src().join("cli/ros2/frame.rs");
+    assert_eq!(crates_used(&std::fs::read_to_string(frames).unwrap()), ["std"], "both programs use this file");
+    for (path, text) in sources() {
+        assert!(!code(&text).contains("rustdds"), "{}: only zsim-ros2 uses DDS", path.display());
+    }
 }

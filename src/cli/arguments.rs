@@ -5,7 +5,7 @@ use super::usage::Usage;
 use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use zsim::estimation;
+use zsim::estimation::{self, EstimatorSpec};
 use zsim::geometry::{Pose, Rotation, Route, Vector};
 use zsim::motion;
 use zsim::random::Seed;
@@ -113,15 +113,31 @@ impl ScenarioArguments {
     }
 }
 
-/// How to estimate.
+/// Settings of the estimator.
 #[derive(Args)]
-pub(super) struct EstimatorArguments {
+pub(super) struct EstimatorSettings {
     /// The estimator's settings, a name under specs/estimators/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     estimator: String,
     /// How many fixed views to keep [default: the settings', 5]
     #[arg(long, value_name = "N")]
     fixed_views: Option<usize>,
+}
+
+impl EstimatorSettings {
+    pub(super) fn spec(&self) -> anyhow::Result<EstimatorSpec> {
+        let mut estimator = estimation::load(&self.estimator)?;
+        estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
+        estimator.check().map_err(|error| Usage(error.to_string()))?;
+        Ok(estimator)
+    }
+}
+
+/// How to estimate.
+#[derive(Args)]
+pub(super) struct EstimatorArguments {
+    #[command(flatten)]
+    settings: EstimatorSettings,
     /// Stop before the global registration
     #[arg(long)]
     open_loop: bool,
@@ -159,10 +175,8 @@ impl From<CloudFormatArgument> for CloudFormat {
 
 impl EstimatorArguments {
     pub(super) fn options(&self) -> anyhow::Result<EstimateOptions> {
-        let mut estimator = estimation::load(&self.estimator)?;
-        estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
+        let mut estimator = self.settings.spec()?;
         estimator.extrinsics.estimated |= self.refine_extrinsics;
-        estimator.check().map_err(|error| Usage(error.to_string()))?;
         let cloud = CloudOptions { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
         Ok(EstimateOptions { closed_loop: !self.open_loop, cloud, ..EstimateOptions::with(estimator) })
     }

@@ -31,6 +31,7 @@ mod recording_files;
 mod recording_size;
 mod repeat;
 mod reproduce;
+mod ros2;
 mod scene;
 mod signals;
 mod simulate;
@@ -84,7 +85,9 @@ enum Command {
     Spring(spring::Arguments),
     Coverage(coverage::Arguments),
     Latency(latency::Arguments),
+    Live(ros2::LiveCommand),
     Map(map::Arguments),
+    Play(ros2::PlayCommand),
     Reproduce(reproduce::Arguments),
     Scene(scene::Arguments),
     Study(study::Arguments),
@@ -133,7 +136,9 @@ fn dispatch(cli: &Cli) -> anyhow::Result<Completion> {
         Command::Spring(arguments) => spring::run(arguments, global),
         Command::Coverage(arguments) => coverage::run(arguments, global),
         Command::Latency(arguments) => latency::run(arguments, global),
+        Command::Live(arguments) => ros2::run_live(arguments, global),
         Command::Map(arguments) => map::run(arguments, global),
+        Command::Play(arguments) => ros2::run_play(arguments, global),
         Command::Reproduce(arguments) => reproduce::run(arguments, global),
         Command::Scene(arguments) => scene::run(arguments, global),
         Command::Study(arguments) => study::run(arguments, global),

@@ -10,6 +10,7 @@ mod hostile;
 mod live;
 mod live_run;
 mod maps;
+mod ros2;
 mod scene;
 mod sensor_models;
 mod specs;

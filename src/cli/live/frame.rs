@@ -98,7 +98,7 @@ impl Framer {
 }
 
 /// The verdict of the most severe finding; times are relative to `start`.
-fn verdict(findings: &[Finding], start: Stamp) -> LiveVerdict {
+pub(in crate::cli) fn verdict(findings: &[Finding], start: Stamp) -> LiveVerdict {
     let Some(worst) = findings.iter().max_by_key(|finding| finding.status) else {
         return LiveVerdict { status: Status::default().name().to_owned(), reason: "no problem so far".to_owned() };
     };

@@ -15,6 +15,7 @@ mod shared;
 mod viewers;
 
 use self::frame::Framer;
+pub(super) use self::frame::verdict;
 use self::queue::Queue;
 use self::run::LiveRun;
 use self::shared::Shared;

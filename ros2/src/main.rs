@@ -1,0 +1,52 @@
+//! `zsim-ros2`: passes messages between zsim and ROS 2, which publishes over DDS.
+//!
+//! `zsim play` and `zsim live` start it, and exchange [frames](frame::Frame) with it over its standard input and output.
+//! It knows neither sensors nor estimates: it is a program of its own so that zsim builds without a DDS library.
+
+#[path = "../../src/cli/ros2/frame.rs"]
+mod frame;
+mod names;
+mod node;
+mod raw;
+
+use frame::Frame;
+use futures::StreamExt;
+use futures::channel::mpsc;
+use std::process::ExitCode;
+
+/// Frames from zsim that wait: they are few, or slower than DDS.
+const WAITING_FRAMES: usize = 64;
+
+fn main() -> ExitCode {
+    let domain = match std::env::args().nth(1).map(|text| text.parse()) {
+        Some(Ok(domain)) => domain,
+        _ => {
+            eprintln!(
+                "error: `zsim play` and `zsim live` start this program; its only argument is a ROS domain, 0 to 232"
+            );
+            return ExitCode::from(2);
+        }
+    };
+    match run(domain) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: DDS: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(domain: u16) -> Result<(), Box<dyn std::error::Error>> {
+    let node = node::Node::new(domain)?;
+    let (mut sender, receiver) = mpsc::channel(WAITING_FRAMES);
+    std::thread::spawn(move || {
+        let mut input = std::io::stdin().lock();
+        // The end of the input, or input that is no frame, ends the program.
+        while let Ok(Some(frame)) = Frame::read(&mut input) {
+            if futures::executor::block_on(futures::SinkExt::send(&mut sender, frame)).is_err() {
+                break;
+            }
+        }
+    });
+    futures::executor::block_on(node.run(receiver.fuse(), &mut std::io::stdout().lock()))
+}
