@@ -4,12 +4,12 @@
 FROM rust:1.89-bookworm AS build
 WORKDIR /zsim
 COPY . .
-RUN cargo build --release --locked --config profile.release.strip=true -p zsim -p zsim-ros2
+RUN cargo build --release --locked --config profile.release.strip=true
 
 # Distroless images have no version tags. As root, because the folders that clusters mount often belong to it.
 # hadolint ignore=DL3007
 FROM gcr.io/distroless/cc-debian12:latest
-COPY --from=build /zsim/target/release/zsim /zsim/target/release/zsim-ros2 /usr/local/bin/
+COPY --from=build /zsim/target/release/zsim /usr/local/bin/zsim
 COPY --from=build /zsim/LICENSE-APACHE /zsim/LICENSE-MIT /usr/share/doc/zsim/
 WORKDIR /data
 ENTRYPOINT ["zsim"]

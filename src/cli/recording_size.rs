@@ -11,7 +11,7 @@ use zsim::study::free_bytes;
 const BEAM_IN_SCAN_BYTES: f64 = 8.0;
 const BEAM_IN_CLOUD_BYTES: f64 = 16.0;
 /// Bytes of a sample of an IMU, compressed.
-const IMU_SAMPLE_BYTES: f64 = 150.0;
+const IMU_SAMPLE_BYTES: f64 = 85.0;
 /// Bytes of the truth at one step of the simulation: in the recording, and the line in the TUM file.
 const TRUTH_BYTES: f64 = 470.0 + 107.0;
 /// Size above which a note reports it, bytes.
@@ -67,7 +67,18 @@ mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
     use zsim::simulation::Scenario;
-    use zsim::study::{ProgressMonitor, record};
+    use zsim::study::{ProgressMonitor, record, record_imus};
+
+    #[test]
+    fn the_size_of_the_imu_alone_is_about_that_of_a_recording() {
+        let here = tempfile::tempdir().unwrap();
+        let simulation = Simulation::prepare(&Scenario { duration_s: 60.0, ..Scenario::in_scene("office") }).unwrap();
+        let file = here.path().join("a.mcap");
+        let mut watch = ProgressMonitor { stop: &AtomicBool::new(false), report: &mut |_| {} };
+        record_imus(&simulation, &file, &mut watch).unwrap();
+        let ratio = expected_bytes(&simulation, Outputs::Imus) / file.metadata().unwrap().len() as f64;
+        assert!((0.7..1.5).contains(&ratio), "{ratio}");
+    }
 
     #[test]
     fn the_size_is_about_that_of_a_recording() {

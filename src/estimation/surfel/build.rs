@@ -71,7 +71,7 @@ impl SurfelBuilder {
         let origin = motion_at(first.tau_s).position;
         let edge_m = self.spec.finest_voxel_m;
         let edges_m: &[f64] = if detail == Detail::Fine { &[edge_m, 0.5 * edge_m] } else { &[edge_m] };
-        let shifts = if self.spec.offset_grids { 2 } else { 1 };
+        let shifts = self.shifts();
         let points = self.project(returns, nominal, unknowns);
         let fragments: Vec<Vec<Fragment>> = (0..edges_m.len() * shifts)
             .into_par_iter()
@@ -90,10 +90,15 @@ impl SurfelBuilder {
         flatness::add_roughness_variance(shaped.concat(), &self.spec)
     }
 
+    /// Number of grids of an edge: the regular one, and with `offset_grids` the one that is offset by half a cell.
+    fn shifts(&self) -> usize {
+        if self.spec.offset_grids { 2 } else { 1 }
+    }
+
     /// The grids of all resolutions, of the regular and, if there are any, offset fragments of the usual and, if there are any, the
     /// fine voxels.
     fn grids<'a>(&self, fragments: &'a [Vec<Fragment>]) -> Vec<Grid<'a>> {
-        let shifts = if self.spec.offset_grids { 2 } else { 1 };
+        let shifts = self.shifts();
         let usual = (0..self.spec.levels).map(|level| (0, level, level));
         let fine = (1..fragments.len() / shifts).map(|edge| (edge, 0, FINE));
         let mut grids = Vec::new();

@@ -81,7 +81,8 @@ fn address_part(name: &str) -> String {
 fn table(name: &str, rows: &[ComparedNumber]) -> PageTable {
     let header = ["quantity", "paper", "goal", "result, median", "worst", "ratio to the paper", "goal is", "in words"];
     let row = |row: &ComparedNumber| {
-        let quantity = format!("{} {}", row.figure, row.what);
+        // A dash is a quantity without a figure in the paper.
+        let quantity = if row.figure == "-" { row.what.clone() } else { format!("{} {}", row.figure, row.what) };
         let paper = if row.paper == "-" { String::new() } else { row.paper.clone() };
         let [goal, numbers @ ..] = row.comparison.as_ref().map_or_else(Default::default, Comparison::cells);
         // A number and its unit stay on one line.
