@@ -342,3 +342,18 @@ fn the_program_for_ros_2_passes_messages_and_does_not_use_the_library() {
         assert!(!code(&text).contains("rustdds"), "{}: only zsim-ros2 uses DDS", path.display());
     }
 }
+
+#[test]
+fn the_package_has_every_source() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut cargo = std::process::Command::new(env!("CARGO"));
+    let list = cargo.current_dir(root).args(["package", "--list", "--allow-dirty", "--offline", "-p", "zsim"]);
+    let output = list.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let packaged = String::from_utf8(output.stdout).unwrap();
+    let packaged: Vec<&str> = packaged.lines().collect();
+    for path in sources().keys() {
+        let name = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
+        assert!(packaged.contains(&name.as_str()), "{name} is not in the package");
+    }
+}
