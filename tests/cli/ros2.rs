@@ -82,6 +82,28 @@ fn a_live_estimate_is_that_of_the_recording_and_survives_a_restart_of_the_player
 }
 
 #[test]
+fn a_live_estimate_in_a_given_map_is_that_of_the_recording() {
+    if bridge().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    recording(here, 14);
+    assert_eq!(run(here, "-q estimate r.mcap --out first").0, 0);
+    let map = "--map first/map.ply --start 0.2,-0.1,0,3";
+    let arguments = format!("live --domain 65 --idle 3s --duration 60s --out live --quiet {map}");
+    let live = start(here, &arguments);
+    let played = start(here, &format!("play r.mcap --domain 65 --wait --quiet {TOPICS}")).wait_with_output().unwrap();
+    assert!(played.status.success());
+    assert!(live.wait_with_output().unwrap().status.code().is_some());
+    run(here, &format!("-q estimate live/recording.mcap --open-loop --out file {map}"));
+    let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
+    let live = read("live/open_loop.tum");
+    assert!(live.lines().count() > 1000);
+    assert_eq!(live, read("file/open_loop.tum"));
+}
+
+#[test]
 fn another_dds_receives_what_is_played() {
     let Some(bridge) = bridge() else { return };
     let folder = tempfile::tempdir().unwrap();

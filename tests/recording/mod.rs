@@ -6,6 +6,7 @@ mod foreign;
 mod formats;
 mod killed;
 mod las;
+mod live;
 mod map;
 mod points;
 mod programs;

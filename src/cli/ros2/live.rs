@@ -2,10 +2,10 @@
 
 use super::DomainArguments;
 use super::bridge::Bridge;
-use super::session::{Limits, Session};
+use super::session::{Limits, Session, Setup};
 use super::sources::Sources;
 use super::start::gather;
-use crate::cli::arguments::{EstimatorSettings, Global, OutArguments, calibration};
+use crate::cli::arguments::{self, EstimatorSettings, Global, OutArguments, calibration};
 use crate::cli::bars::{WorkBar, stop_flag};
 use crate::cli::completion::Completion;
 use crate::cli::{output, quantity};
@@ -13,7 +13,9 @@ use clap::Args;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+use zsim::geometry::Pose;
 use zsim::recording::TopicPreference;
+use zsim::study::MapOptions;
 
 /// Estimate trajectory and map from live ROS 2 topics
 ///
@@ -37,6 +39,14 @@ pub(in crate::cli) struct LiveCommand {
     /// RON file with extrinsics and noise of the sensors, as of `zsim estimate`
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    /// Localise the head in this map of an earlier run (its map.ply); the poses are then in the frame of the map
+    #[arg(long, value_name = "MAP.ply")]
+    map: Option<PathBuf>,
+    /// Initial position and yaw in the map, accurate to a metre and twenty degrees: metres, and degrees about the
+    /// vertical
+    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = arguments::start, default_value = "0,0,0,0", requires = "map",
+        allow_hyphen_values = true)]
+    start: Pose,
     /// End after this time [default: with Ctrl-C]
     #[arg(long, value_name = "TIME", value_parser = quantity::seconds)]
     duration: Option<f64>,
@@ -52,6 +62,8 @@ pub(in crate::cli) struct LiveCommand {
 
 pub(in crate::cli) fn run(command: &LiveCommand, global: &Global) -> anyhow::Result<Completion> {
     let (spec, given) = (command.estimator.spec()?, calibration(command.calibration.as_deref())?);
+    let within = |path: &PathBuf| MapOptions::read(path, command.start, false);
+    let map = command.map.as_ref().map(within).transpose()?;
     let mut bridge = Bridge::start(command.domain.domain()?)?;
     let stop = stop_flag();
     let started = Instant::now();
@@ -62,6 +74,12 @@ pub(in crate::cli) fn run(command: &LiveCommand, global: &Global) -> anyhow::Res
     let start = gather(&mut bridge, &mut sources, until, || stop.load(Ordering::Relaxed), &bar)?;
     let sensors = start.finish(&preference, &given)?;
     sensors.selection.notes.iter().for_each(|note| bar.note(note));
+    if !sensors.found.from_recording && (given.head_from_laser.is_none() || given.head_from_imu.is_none()) {
+        bar.note(
+            "no /tf_static has arrived: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
+             extrinsics with --calibration",
+        );
+    }
     bar.note(&format!("lidar {}, IMU {}", sensors.selection.lidar_topic, sensors.selection.imu_topic));
     let used = TopicPreference {
         lidar_topic: Some(sensors.selection.lidar_topic.clone()),
@@ -73,7 +91,8 @@ pub(in crate::cli) fn run(command: &LiveCommand, global: &Global) -> anyhow::Res
     // A folder only once there is something to write.
     let folder = command.out.out.as_deref().map(|wanted| output::folder(wanted, command.out.force)).transpose()?;
     let folder_path = folder.as_ref().map(|folder| folder.to_path_buf());
-    let mut session = Session::new(spec, &sensors, folder_path.as_deref(), bridge)?;
+    let setup = Setup { spec, calibration: sensors.found.calibration.clone(), map };
+    let mut session = Session::new(setup, &sensors, folder_path.as_deref(), bridge)?;
     let limits = Limits { stop, until, idle: command.idle.map(Duration::from_secs_f64) };
     session.take_start(&sensors)?;
     session.follow(&mut sources, &limits, &bar)?;

@@ -16,10 +16,13 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
-use zsim::estimation::{EstimatedPose, Estimator, EstimatorSpec, Evidence, Status, Warning, WindowReport, findings};
+use zsim::estimation::{
+    EstimatedPose, EstimationError, Estimator, EstimatorSpec, Evidence, Status, Warning, WindowReport, findings,
+};
 use zsim::geometry::Vector;
 use zsim::measurement::{Calibration, Measurement};
 use zsim::recording::{Diagnostic, DiagnosticLevel, Incoming, ReceivedWriter, TumWriter};
+use zsim::study::MapOptions;
 use zsim::time::Stamp;
 
 /// Time between looks at the stop flag.
@@ -64,10 +67,27 @@ impl Latency {
     }
 }
 
+/// How to start an estimate.
+pub(super) struct Setup {
+    pub(super) spec: EstimatorSpec,
+    pub(super) calibration: Calibration,
+    /// The map in which to localise the head, if any.
+    pub(super) map: Option<MapOptions>,
+}
+
+impl Setup {
+    fn estimator(&self) -> Result<Estimator, EstimationError> {
+        let estimator = Estimator::new(&self.spec, &self.calibration)?;
+        Ok(match &self.map {
+            Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
+            None => estimator,
+        })
+    }
+}
+
 /// An estimate from live topics.
 pub(super) struct Session {
-    spec: EstimatorSpec,
-    calibration: Calibration,
+    setup: Setup,
     bridge: Bridge,
     incoming: Incoming,
     estimator: Estimator,
@@ -137,18 +157,17 @@ fn now() -> Stamp {
 impl Session {
     /// Announces the topics of the estimate, and creates the files in `folder`.
     pub(super) fn new(
-        spec: EstimatorSpec,
+        setup: Setup,
         sensors: &Sensors,
         folder: Option<&Path>,
         mut bridge: Bridge,
     ) -> anyhow::Result<Self> {
-        let calibration = sensors.found.calibration.clone();
-        let publisher = EstimatePublisher::new(&sensors.found.body_frame, calibration.head_from_laser, &mut bridge)?;
+        let head_from_laser = setup.calibration.head_from_laser;
+        let publisher = EstimatePublisher::new(&sensors.found.body_frame, head_from_laser, &mut bridge)?;
         let recording = folder.map(|folder| File::create(folder.join("recording.mcap"))).transpose()?;
         Ok(Self {
-            estimator: Estimator::new(&spec, &calibration)?,
-            spec,
-            calibration,
+            estimator: setup.estimator()?,
+            setup,
             bridge,
             incoming: Incoming::new(&sensors.selection),
             publisher,
@@ -239,8 +258,8 @@ impl Session {
             return Ok(());
         }
         let frame = self.publisher.body_frame().to_owned();
-        self.estimator = Estimator::new(&self.spec, &self.calibration)?;
-        self.publisher = EstimatePublisher::again(&frame, self.calibration.head_from_laser);
+        self.estimator = self.setup.estimator()?;
+        self.publisher = EstimatePublisher::again(&frame, self.setup.calibration.head_from_laser);
         (self.inputs, self.known_windows) = (Inputs::default(), 0);
         self.restarts += 1;
         Ok(())
@@ -282,12 +301,16 @@ impl Session {
 
     /// Completes the estimate and prints what it is worth.
     pub(super) fn finish(mut self, global: &Global, folder: Option<&Path>) -> anyhow::Result<Completion> {
-        let spare = Estimator::new(&self.spec, &self.calibration)?;
-        let result = std::mem::replace(&mut self.estimator, spare).finish()?;
-        self.output(&result.poses)?;
+        let spare = self.setup.estimator()?;
+        let result = std::mem::replace(&mut self.estimator, spare).finish();
+        if let Ok(result) = &result {
+            self.output(&result.poses)?;
+        }
+        // The files are complete also if the last measurements were too few for an estimate.
         self.recording.take().map_or(Ok(()), ReceivedWriter::finish)?;
         self.tum.take().map_or(Ok(()), TumWriter::finish)?;
         self.bridge.finish()?;
+        let result = result?;
         let evidence = self.inputs.evidence(&result.windows, &result.warnings);
         let found = evidence.as_ref().map(findings).unwrap_or_default();
         let start = self.inputs.estimated.unwrap_or_default().0;

@@ -14,6 +14,8 @@ use zsim::time::Stamp;
 
 /// Time of both sensors that shows how to read them, s: some periods of each, and the rest in which the estimator starts.
 const ENOUGH_S: f64 = 3.0;
+/// Maximum size of the messages that wait while a sensor is missing, bytes; then they are gathered anew.
+const MAX_WAITING_BYTES: usize = 512 << 20;
 /// Name of the recording of these seconds, in messages.
 const NAME: &str = "the live topics";
 
@@ -23,12 +25,25 @@ pub(super) struct Start {
     writer: ReceivedWriter<File>,
     /// First and last arrival of the messages of lidars and IMUs.
     spans: [Option<(Stamp, Stamp)>; 2],
+    /// The messages on extrinsics, which are published once, with their arrival.
+    extrinsics: Vec<(RosTopic, Stamp, Vec<u8>)>,
+    bytes: usize,
 }
 
 impl Start {
     pub(super) fn new() -> anyhow::Result<Self> {
         let file = tempfile::tempfile()?;
-        Ok(Self { writer: ReceivedWriter::new(file.try_clone()?)?, file, spans: [None; 2] })
+        let writer = ReceivedWriter::new(file.try_clone()?)?;
+        Ok(Self { file, writer, spans: [None; 2], extrinsics: Vec::new(), bytes: 0 })
+    }
+
+    /// Begins again, with the extrinsics only.
+    fn again(self) -> anyhow::Result<Self> {
+        let mut again = Self::new()?;
+        for (topic, arrival, message) in &self.extrinsics {
+            again.add(topic, Purpose::Extrinsics, *arrival, message)?;
+        }
+        Ok(again)
     }
 
     /// Adds a message.
@@ -40,10 +55,14 @@ impl Start {
         message: &[u8],
     ) -> anyhow::Result<()> {
         self.writer.message(&topic.name, &topic.type_name, arrival, message)?;
+        self.bytes += message.len();
         let span = match purpose {
             Purpose::Lidar => &mut self.spans[0],
             Purpose::Imu => &mut self.spans[1],
-            Purpose::Extrinsics => return Ok(()),
+            Purpose::Extrinsics => {
+                self.extrinsics.push((topic.clone(), arrival, message.to_vec()));
+                return Ok(());
+            }
         };
         span.get_or_insert((arrival, arrival)).1 = arrival;
         Ok(())
@@ -118,6 +137,9 @@ pub(super) fn gather(
                 }
             }
             _ => {}
+        }
+        if start.bytes > MAX_WAITING_BYTES && !start.is_complete() {
+            start = start.again()?;
         }
     }
     Ok(start)

@@ -10,11 +10,12 @@ use crate::time::{Span, Stamp};
 impl Estimator {
     /// The poses after `after` up to the end of the window, at whole multiples of the IMU period, as estimated so far.
     ///
-    /// Later windows change them; [`Self::take_poses`] returns them when they are final. None before the first window, and
-    /// none while the estimate has lost its place after a gap.
+    /// Later windows change them; [`Self::take_poses`] returns them when they are final. None before the first window,
+    /// before the localisation in a given map, and while the place after a gap is not known.
     pub fn newest_poses(&self, after: Option<Stamp>) -> Vec<EstimatedPose> {
         let Phase::Tracking(tracking) = &self.phase else { return Vec::new() };
-        if self.phase.awaits_relocalisation() {
+        let is_unplaced = self.map_localisation.as_ref().is_some_and(|map| map.found().is_none());
+        if is_unplaced || self.phase.awaits_relocalisation() {
             return Vec::new();
         }
         let window = &tracking.window;
