@@ -1,3 +1,5 @@
+//! Counts of a sensor's messages, and of those that are missing.
+
 use crate::signal::{Regularity, StampPattern};
 use crate::time::Stamp;
 
@@ -8,7 +10,7 @@ const MISSING_TOLERANCE: f64 = 0.005;
 
 /// Counts the messages of a sensor, and the missing messages relative to a constant rate.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Cadence {
+pub struct Cadence {
     first: Option<Stamp>,
     last: Option<Stamp>,
     count: usize,
@@ -16,7 +18,8 @@ pub(super) struct Cadence {
 }
 
 impl Cadence {
-    pub(super) fn take(&mut self, stamp: Stamp) {
+    /// Counts a message.
+    pub fn take(&mut self, stamp: Stamp) {
         if self.first_stamps_s.len() < PERIOD_STAMPS && self.last.is_none_or(|last| stamp >= last) {
             self.first_stamps_s.push(stamp.seconds_since(self.first.unwrap_or(stamp)));
         }
@@ -26,17 +29,17 @@ impl Cadence {
     }
 
     /// Number of messages.
-    pub(super) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.count
     }
 
     /// First and last stamp.
-    pub(super) fn span(&self) -> Option<(Stamp, Stamp)> {
+    pub fn span(&self) -> Option<(Stamp, Stamp)> {
         Some((self.first?, self.last?))
     }
 
     /// A message on missing data, if more than 0.5 % of the messages are missing.
-    pub(super) fn missing(&self, messages: &str) -> Option<String> {
+    pub fn missing(&self, messages: &str) -> Option<String> {
         let (first, last) = self.span()?;
         let expected = (last.seconds_since(first) / self.period_s()?).round() + 1.0;
         let missing = expected - self.count as f64;

@@ -22,7 +22,7 @@ use zsim::estimation::{
 use zsim::geometry::Vector;
 use zsim::measurement::{Calibration, Measurement};
 use zsim::recording::{Diagnostic, DiagnosticLevel, Incoming, ReceivedWriter, TumWriter};
-use zsim::study::MapOptions;
+use zsim::study::{Cadence, MapOptions};
 use zsim::time::Stamp;
 
 /// Time between looks at the stop flag.
@@ -105,11 +105,10 @@ pub(super) struct Session {
 }
 
 /// What the current estimate has received and returned.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 struct Inputs {
-    samples: usize,
-    scans: usize,
-    recorded: Option<(Stamp, Stamp)>,
+    imu: Cadence,
+    lidar: Cadence,
     estimated: Option<(Stamp, Stamp)>,
     length_m: f64,
     last_position: Option<Vector>,
@@ -117,13 +116,21 @@ struct Inputs {
 
 impl Inputs {
     fn take(&mut self, measurement: &Measurement) {
-        let stamp = stamp_of(measurement);
         match measurement {
-            Measurement::Imu(_) => self.samples += 1,
-            Measurement::Lidar(_) => self.scans += 1,
+            Measurement::Imu(sample) => self.imu.take(sample.stamp),
+            Measurement::Lidar(scan) => self.lidar.take(scan.stamp),
         }
-        let (first, last) = self.recorded.get_or_insert((stamp, stamp));
-        (*first, *last) = ((*first).min(stamp), (*last).max(stamp));
+    }
+
+    /// First and last stamp of the measurements.
+    fn recorded(&self) -> Option<(Stamp, Stamp)> {
+        let spans = [self.imu.span(), self.lidar.span()];
+        spans.into_iter().flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// Sentences on messages that did not arrive.
+    fn missing(&self) -> impl Iterator<Item = String> {
+        [self.imu.missing("IMU samples"), self.lidar.missing("scans")].into_iter().flatten()
     }
 
     fn take_final(&mut self, pose: &EstimatedPose) {
@@ -133,10 +140,10 @@ impl Inputs {
         self.last_position = Some(position);
     }
 
-    fn evidence<'a>(&self, windows: &'a [WindowReport], warnings: &'a [Warning]) -> Option<Evidence<'a>> {
+    /// The evidence on the poses so far, as if the measurements ended at the last final pose.
+    fn evidence_so_far<'a>(&self, windows: &'a [WindowReport], warnings: &'a [Warning]) -> Option<Evidence<'a>> {
         let estimated = self.estimated?;
-        // As if the measurements ended at the last final pose.
-        Some(Evidence { windows, warnings, samples: self.samples, recorded: estimated, estimated })
+        Some(Evidence { windows, warnings, samples: self.imu.count(), recorded: estimated, estimated })
     }
 }
 
@@ -253,7 +260,7 @@ impl Session {
 
     /// Starts a new estimate if the measurements have begun again, as those of a player that was started again.
     fn restart_if_earlier(&mut self, measurement: &Measurement) -> anyhow::Result<()> {
-        let Some((_, last)) = self.inputs.recorded else { return Ok(()) };
+        let Some((_, last)) = self.inputs.recorded() else { return Ok(()) };
         if last.seconds_since(stamp_of(measurement)) < RESTARTED_S {
             return Ok(());
         }
@@ -271,7 +278,7 @@ impl Session {
             return Ok(());
         }
         self.status_published = Some(Instant::now());
-        let Some(evidence) = self.inputs.evidence(self.estimator.windows(), self.estimator.warnings()) else {
+        let Some(evidence) = self.inputs.evidence_so_far(self.estimator.windows(), self.estimator.warnings()) else {
             return Ok(());
         };
         let found = findings(&evidence);
@@ -289,8 +296,8 @@ impl Session {
             name: "zsim: estimate".to_owned(),
             message: format!("{}: {}", verdict.status, verdict.reason),
             values: vec![
-                value("scans", self.inputs.scans.to_string()),
-                value("imu_samples", self.inputs.samples.to_string()),
+                value("scans", self.inputs.lidar.count().to_string()),
+                value("imu_samples", self.inputs.imu.count().to_string()),
                 value("latency_mean_s", format!("{:.4}", self.latency.mean_s())),
                 value("latency_largest_s", format!("{:.4}", self.latency.largest_s)),
                 value("restarts", self.restarts.to_string()),
@@ -311,20 +318,21 @@ impl Session {
         self.tum.take().map_or(Ok(()), TumWriter::finish)?;
         self.bridge.finish()?;
         let result = result?;
-        let evidence = self.inputs.evidence(&result.windows, &result.warnings);
-        let found = evidence.as_ref().map(findings).unwrap_or_default();
-        let start = self.inputs.estimated.unwrap_or_default().0;
-        let verdict = live::verdict(&found, start);
-        let seconds = self.inputs.recorded.map_or(0.0, |(first, last)| last.seconds_since(first));
-        let losses = self.incoming.loss().sentences();
         let (inputs, latency) = (&self.inputs, &self.latency);
+        let recorded = inputs.recorded().unwrap_or_default();
+        let evidence = inputs.evidence_so_far(&result.windows, &result.warnings);
+        let found = evidence.map(|so_far| findings(&Evidence { recorded, ..so_far })).unwrap_or_default();
+        let verdict = live::verdict(&found, recorded.0);
+        let reason = verdict.reason.trim_end_matches(" (so far)").trim_end_matches(" so far");
+        let seconds = recorded.1.seconds_since(recorded.0);
+        let losses: Vec<String> = self.incoming.loss().sentences().into_iter().chain(inputs.missing()).collect();
         let mut text = format!(
             "status        {}: {}\nmeasurements  {} scans, {} IMU samples in {seconds:.1} s\ntravelled     {:.1} m\n\
              latency       {:.1} ms mean, {:.1} ms at most, behind the window\n",
             verdict.status,
-            verdict.reason,
-            inputs.scans,
-            inputs.samples,
+            reason,
+            inputs.lidar.count(),
+            inputs.imu.count(),
             inputs.length_m,
             1e3 * latency.mean_s(),
             1e3 * latency.largest_s
@@ -335,9 +343,9 @@ impl Session {
         }
         let json = json!({
             "status": verdict.status,
-            "reason": verdict.reason,
-            "scans": inputs.scans,
-            "imu_samples": inputs.samples,
+            "reason": reason,
+            "scans": inputs.lidar.count(),
+            "imu_samples": inputs.imu.count(),
             "duration_s": seconds,
             "travelled_m": inputs.length_m,
             "latency": { "mean_s": latency.mean_s(), "largest_s": latency.largest_s, "windows": latency.windows },
@@ -345,7 +353,7 @@ impl Session {
             "restarts": self.restarts,
         });
         output::print_result(global, &text, json, folder)?;
-        let is_good = found.iter().all(|finding| finding.status == Status::Good) && self.incoming.loss().is_none();
+        let is_good = found.iter().all(|finding| finding.status == Status::Good) && losses.is_empty();
         Ok(if is_good { Completion::Done } else { Completion::WithLoss })
     }
 }
