@@ -128,9 +128,8 @@ def live(domain, path):
     participant = DomainParticipant(domain)
     writers = {t: DataWriter(participant, Topic(participant, "rt" + t, kind), qos=quality(t)) for t, kind in RECORDED.items()}
     subscribed = readers(participant, PUBLISHED)
-    scans = writers["/scan"]
     limit = time.monotonic() + 30
-    while not scans.get_matched_subscriptions() and time.monotonic() < limit:
+    while not all(writer.get_matched_subscriptions() for writer in writers.values()) and time.monotonic() < limit:
         time.sleep(0.05)
     counts, last = {topic: 0 for topic in PUBLISHED}, {}
 

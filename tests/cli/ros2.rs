@@ -140,7 +140,9 @@ fn a_live_estimate_of_another_dds_is_published_to_it() {
     assert_eq!(published["frames"], serde_json::json!(["map", "head", "head"]));
     assert_eq!(published["fields"], serde_json::json!(["x", "y", "z", "intensity"]));
     assert_eq!(published["level"], 0);
-    assert_eq!(published["counts"]["/odom"], published["counts"]["/tf"]);
+    // The subscriber discovers one of the two topics first.
+    let count = |topic: &str| published["counts"][topic].as_i64().unwrap();
+    assert!(count("/odom") > 800 && (count("/odom") - count("/tf")).abs() < 100, "{published}");
     assert!(published["counts"]["/cloud"].as_u64() > Some(8) && published["points"].as_u64() > Some(10_000));
     // The newest pose has the time of a pose of the file, and differs little from the final one.
     let stamp = published["stamp"].as_str().unwrap();

@@ -190,16 +190,25 @@ impl Session {
     }
 
     /// Takes in the first seconds, which are not new any more.
+    ///
+    /// They are sorted by stamp, as in an estimate from the file: the time axis begins with the first measurement, and a scan
+    /// arrives after the IMU samples of its time.
     pub(super) fn take_start(&mut self, sensors: &Sensors) -> anyhow::Result<()> {
         let topics = sensors.reader.cdr_topics();
-        let mut outcome = Ok(());
+        let (mut outcome, mut first) = (Ok(()), Vec::new());
         sensors.reader.play(&topics, |message| {
             let type_name = topics.get(message.topic).map(String::as_str).unwrap_or_default();
-            outcome = self.take(message.topic, type_name, message.log_time, message.cdr);
+            outcome = self.record(message.topic, type_name, message.log_time, message.cdr);
+            first.extend(self.incoming.message(message.topic, message.cdr));
             if outcome.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         })?;
+        outcome?;
+        first.sort_by_key(stamp_of);
+        for measurement in first {
+            self.push(measurement, now())?;
+        }
         self.latency = Latency::default();
-        outcome
+        Ok(())
     }
 
     /// Takes in messages until a limit is reached.
@@ -224,16 +233,27 @@ impl Session {
 
     /// Takes in a message that arrived at `arrival`.
     fn take(&mut self, topic: &str, type_name: &str, arrival: Stamp, message: &[u8]) -> anyhow::Result<()> {
-        if let Some(recording) = &mut self.recording {
-            recording.message(topic, type_name, arrival, message)?;
-        }
+        self.record(topic, type_name, arrival, message)?;
         for measurement in self.incoming.message(topic, message) {
             self.last_measurement = Instant::now();
-            self.restart_if_earlier(&measurement)?;
-            self.inputs.take(&measurement);
-            self.publisher.keep(&measurement);
-            self.estimator.push(measurement)?;
+            self.push(measurement, arrival)?;
         }
+        Ok(())
+    }
+
+    fn record(&mut self, topic: &str, type_name: &str, arrival: Stamp, message: &[u8]) -> anyhow::Result<()> {
+        match &mut self.recording {
+            Some(recording) => Ok(recording.message(topic, type_name, arrival, message)?),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds a measurement, which arrived at `arrival`, and publishes the poses of the windows that it completes.
+    fn push(&mut self, measurement: Measurement, arrival: Stamp) -> anyhow::Result<()> {
+        self.restart_if_earlier(&measurement)?;
+        self.inputs.take(&measurement);
+        self.publisher.keep(&measurement);
+        self.estimator.push(measurement)?;
         let windows = self.estimator.windows().len();
         if windows == self.known_windows {
             return Ok(());

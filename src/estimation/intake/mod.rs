@@ -18,7 +18,7 @@ use super::surfel::TimedReturn;
 use super::{Discarded, EstimationError, Warning, WarningKind};
 use crate::measurement::{Calibration, Measurement};
 use crate::signal::Regularity;
-use crate::time::{NANOS_PER_SECOND, Span, Stamp};
+use crate::time::{Span, Stamp};
 
 /// Measurements that arrive out of order by up to this are sorted, s.
 const MAX_DISORDER_S: f64 = 0.1;
@@ -57,7 +57,7 @@ pub(super) struct Segment {
 pub(super) struct Intake {
     spec: EstimatorSpec,
     calibration: Calibration,
-    /// Origin of the time axis in seconds.
+    /// Origin of the time axis in seconds: the stamp of the first measurement.
     origin: Option<Stamp>,
     samples: SampleQueue,
     scans: ScanQueue,
@@ -139,25 +139,16 @@ impl Intake {
         (self.samples.count, self.scans.count)
     }
 
-    /// The origin of the time axis: the whole second before the first measurement, whose `stamp` this is if there is none yet.
-    ///
-    /// Knots and segments are multiples of their spacing from the origin. A whole second is the same whichever sensor's
-    /// measurement arrives first, so a live estimate is that of the recording.
-    fn origin_of(&mut self, stamp: Stamp) -> Stamp {
-        let seconds = stamp.nanos().div_euclid(NANOS_PER_SECOND);
-        *self.origin.get_or_insert(Stamp::from_nanos(seconds * NANOS_PER_SECOND))
-    }
-
     /// Queues a measurement in the order of the stamps of its sensor.
     pub(super) fn push(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
         match measurement {
             Measurement::Imu(sample) => {
-                let seconds = sample.stamp.seconds_since(self.origin_of(sample.stamp));
+                let seconds = sample.stamp.seconds_since(*self.origin.get_or_insert(sample.stamp));
                 self.samples.push(seconds, sample);
                 Ok(())
             }
             Measurement::Lidar(scan) => {
-                let seconds = scan.stamp.seconds_since(self.origin_of(scan.stamp));
+                let seconds = scan.stamp.seconds_since(*self.origin.get_or_insert(scan.stamp));
                 self.scans.push(seconds, scan)
             }
         }
