@@ -16,7 +16,7 @@ import time
 import types
 from dataclasses import dataclass
 
-# On a machine without multicast, and apart from other machines.
+# Without multicast, and only on this machine.
 os.environ.setdefault("CYCLONEDDS_URI", """<CycloneDDS><Domain>
   <General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
   <Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>

@@ -43,7 +43,7 @@ fn json(output: &Output) -> serde_json::Value {
         .unwrap_or_else(|error| panic!("{error}: {text} {}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// A player and an estimate of two processes; then the player begins again, and the estimate goes on with a new map.
+/// A player and an estimate of two processes; then the player starts again, and the estimate goes on with a new map.
 #[test]
 fn a_live_estimate_is_that_of_the_recording_and_survives_a_restart_of_the_player() {
     if bridge().is_none() {

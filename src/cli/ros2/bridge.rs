@@ -81,13 +81,13 @@ impl Drop for Bridge {
     }
 }
 
-/// The program beside zsim, else one of that name on the path.
+/// The program in the folder of zsim, else one of that name on the path.
 fn program() -> anyhow::Result<PathBuf> {
     let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
-    let beside = std::env::current_exe()?.with_file_name(&name);
+    let in_folder = std::env::current_exe()?.with_file_name(&name);
     let on_path =
         std::env::var_os("PATH").into_iter().flat_map(|path| std::env::split_paths(&path).collect::<Vec<_>>());
-    let mut candidates = std::iter::once(beside).chain(on_path.map(|folder| folder.join(&name)));
+    let mut candidates = std::iter::once(in_folder).chain(on_path.map(|folder| folder.join(&name)));
     let found = candidates.find(|path| path.is_file()).ok_or_else(|| {
         Usage(format!(
             "`{PROGRAM}`, which connects zsim to ROS 2, is neither in the folder of zsim nor on the path: it is in the \

@@ -191,7 +191,7 @@ impl Session {
 
     /// Takes in the first seconds, which are not new any more.
     ///
-    /// They are sorted by stamp, as in an estimate from the file: the time axis begins with the first measurement, and a scan
+    /// They are sorted by stamp, as in an estimate from the file: the time axis starts with the first measurement, and a scan
     /// arrives after the IMU samples of its time.
     pub(super) fn take_start(&mut self, sensors: &Sensors) -> anyhow::Result<()> {
         let topics = sensors.reader.cdr_topics();
@@ -270,7 +270,7 @@ impl Session {
     fn output(&mut self, poses: &[EstimatedPose]) -> anyhow::Result<()> {
         for pose in poses {
             self.inputs.take_final(pose);
-            // After a restart the stamps begin again; a trajectory file has one run.
+            // After a restart the stamps start again; a trajectory file has one run.
             if let Some(tum) = self.tum.as_mut().filter(|_| self.restarts == 0) {
                 tum.pose(pose.stamp, &pose.map_from_head)?;
             }
