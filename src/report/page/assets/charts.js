@@ -57,13 +57,19 @@ const logarithmicTicks = (plot, splits, at) => {
   return splits.map((y) => (y > 0 && shown.includes(Math.round(y / 10 ** Math.floor(Math.log10(y) + 1e-9))) ? label(y) : ""));
 };
 
+// Just below a power of ten, uPlot steps over it and then never ends: such a scale starts at the ninefold of the power before.
+const belowTick = (y) => {
+  const decade = 10 ** Math.floor(Math.log10(y));
+  return y > 9 * decade ? 9 * decade : y;
+};
+
 // A logarithmic scale that ends at the data, where uPlot would add up to a decade, and covers at least the ratio `least`.
 const logarithmicScale = (margin, least) => ({
   distr: 3,
   range: (plot, min, max) => {
     if (!(min > 0)) return [0.1, 10];
     const widened = Math.max(margin, Math.sqrt((least * min) / max));
-    return [min / widened, max * widened];
+    return [belowTick(min / widened), max * widened];
   },
 });
 
