@@ -47,13 +47,20 @@ pub struct RunsSpec {
     pub notes: Vec<String>,
 }
 
-/// The smoke test of an experiment: the first seed of its study, with shorter runs.
+/// The smoke test of an experiment: the first seeds of its study, with shorter runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuickSpec {
     /// Duration of a run, s.
     #[serde(with = "checked::Positive")]
     pub duration_s: f64,
+    /// Number of seeds.
+    #[serde(default = "one")]
+    pub seeds: usize,
+}
+
+fn one() -> usize {
+    1
 }
 
 /// A measure of a level of the study, median and worst of the seeds.
@@ -267,9 +274,9 @@ impl RunsSpec {
 }
 
 impl QuickSpec {
-    /// Keeps the first seed of a study, and shortens its runs.
+    /// Keeps the first seeds of a study, and shortens its runs.
     fn shorten(&self, spec: &mut SweepSpec) {
-        spec.seeds.truncate(1);
+        spec.seeds.truncate(self.seeds.max(1));
         if let BaseSpec::Journey { duration_s, .. } = &mut spec.base {
             *duration_s = self.duration_s;
         }
