@@ -17,7 +17,7 @@ pub(super) const HEAD_MODEL: &str = "head.urdf";
 pub(super) fn write_for_recording(folder: &Path, simulation: &Simulation) -> Result<(), StudyError> {
     let layout = include_str!("../../examples/viewers/recording.foxglove.json");
     write_text(folder, &folder.join(RECORDING_LAYOUT), layout)?;
-    // A head that is not on springs, or whose springs couple or weigh too much, has no such model; viewers show its frames.
+    // A head that is not on springs, or that six joints cannot show, has no such model; viewers show its frames.
     match HeadExport::new(&simulation.inputs().head.spec, simulation.head()) {
         Ok(model) => write_text(folder, &folder.join(HEAD_MODEL), &model.urdf()),
         Err(_) => Ok(()),

@@ -28,11 +28,18 @@ fn difference_in_mujoco(head: &str) -> Option<f64> {
 
 #[test]
 fn heads_have_the_same_modes_in_mujoco() {
-    // Measured: below 1e-5.
-    for head in ["handheld", "elastic_cables", "rope_pendulum"] {
+    // Without couplings to the last digit. Wire that moves with the head, and screws, are approximated.
+    for (head, allowed) in [
+        ("elastic_cables", 3e-5),
+        ("rope_pendulum", 3e-5),
+        ("handheld", 3e-5),
+        ("backpack", 6e-3),
+        ("hanging", 6e-3),
+        ("vehicle_three_springs", 6e-3),
+    ] {
         let Some(difference) = difference_in_mujoco(head) else { return };
         println!("{head}: {difference}");
-        assert!(difference < 3e-5, "{head}: {difference}");
+        assert!(difference < allowed, "{head}: {difference}");
     }
 }
 
@@ -55,12 +62,9 @@ fn sdf_has_the_springs_and_urdf_the_frames_of_recordings() {
 #[test]
 fn a_head_without_elastic_joints_is_refused_with_the_reason() {
     let here = tempfile::tempdir().unwrap();
-    for (head, reason) in [
-        ("rigid", "there is no spring"),
-        ("universal_joint", "two rotations"),
-        ("nodding", "a motor"),
-        ("backpack", "the mass of the wire"),
-    ] {
+    for (head, reason) in
+        [("rigid", "there is no spring"), ("universal_joint", "two rotations"), ("nodding", "a motor")]
+    {
         let (code, _, errors) = run(here.path(), &format!("spring export {head} --out robot"));
         assert_eq!(code, 1, "{head}");
         assert!(errors.contains(reason), "{head}: {errors}");

@@ -1,6 +1,7 @@
 //! The model as MJCF, with springs in the joints, as MuJoCo reads it.
 
-use super::{ElasticJoint, HeadExport, list};
+use super::joints::ElasticJoint;
+use super::{HeadExport, list};
 use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 use std::fmt::Write as _;
 

@@ -1,6 +1,7 @@
 //! The model as SDF, with springs in the joints, as Gazebo reads it.
 
-use super::{ElasticJoint, HeadExport, LINK_INERTIA_KG_M2, LINK_MASS_KG, list, position_and_angles};
+use super::joints::ElasticJoint;
+use super::{HeadExport, LINK_INERTIA_KG_M2, LINK_MASS_KG, list, position_and_angles};
 use crate::geometry::{Matrix, Pose, Vector};
 use std::fmt::Write as _;
 

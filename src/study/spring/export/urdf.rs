@@ -1,6 +1,7 @@
 //! The model as URDF: shape, mass and joints; the stiffness is a comment, because URDF has no springs.
 
-use super::{ElasticJoint, HeadExport, LINK_INERTIA_KG_M2, LINK_MASS_KG, list, position_and_angles};
+use super::joints::ElasticJoint;
+use super::{HeadExport, LINK_INERTIA_KG_M2, LINK_MASS_KG, list, position_and_angles};
 use crate::geometry::{Pose, Vector};
 use std::fmt::Write as _;
 
