@@ -7,6 +7,7 @@ use crate::spec::{Kind, Source, SpecError, checked, find_from, parse};
 use crate::study::gains::AXES;
 use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
+use std::num::NonZeroUsize;
 
 /// An experiment of the paper.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -56,11 +57,11 @@ pub struct QuickSpec {
     pub duration_s: f64,
     /// Number of seeds.
     #[serde(default = "one")]
-    pub seeds: usize,
+    pub seeds: NonZeroUsize,
 }
 
-fn one() -> usize {
-    1
+fn one() -> NonZeroUsize {
+    NonZeroUsize::MIN
 }
 
 /// A measure of a level of the study, median and worst of the seeds.
@@ -276,7 +277,7 @@ impl RunsSpec {
 impl QuickSpec {
     /// Keeps the first seeds of a study, and shortens its runs.
     fn shorten(&self, spec: &mut SweepSpec) {
-        spec.seeds.truncate(self.seeds.max(1));
+        spec.seeds.truncate(self.seeds.get());
         if let BaseSpec::Journey { duration_s, .. } = &mut spec.base {
             *duration_s = self.duration_s;
         }
