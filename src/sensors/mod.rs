@@ -7,7 +7,8 @@
 //!
 //! - lidar: [`Lidar::sweep`] casts the rays of one scan, each from the pose at the firing time of its beam;
 //!   [`Lidar::measure`] computes the scan from the intersections;
-//! - IMU: [`ideal_reading`] is the ideal sample over an interval; [`ImuErrors::measure`] adds the errors;
+//! - IMU: [`ideal_reading`] is the ideal sample over an interval; [`ImuErrors::measure`] adds the errors; [`ImuSampler`] does
+//!   both for a moving body, with saturation within the interval and the output filter;
 //! - clock: [`Clock`] determines the sample times and the mean stamps; [`Stamper`] adds the jitter.
 //!
 //! Each source of noise has a separate random stream, named after the quantity it disturbs. The streams of a lidar have
@@ -24,7 +25,8 @@ mod track;
 pub use carrier::{Cylinder, SceneryWithCarrier};
 pub use clock::{Clock, ClockSpec, Clocks, ClocksSpec};
 pub use imu::{
-    AccelSpec, GaussMarkovSpec, GyroSpec, Imu, ImuErrors, ImuSpec, InertialReading, coning_corrected, ideal_reading,
+    AccelSpec, GaussMarkovSpec, GyroSpec, Imu, ImuErrors, ImuSampler, ImuSpec, InertialReading, OutputFilterSpec,
+    WarmUpSpec, coning_corrected, ideal_reading,
 };
 pub use lidar::{
     Beam, BeamModel, DetectionSpec, GlassSpec, GrazingSpec, Lidar, LidarErrors, LidarErrorsSpec, LidarSpec,

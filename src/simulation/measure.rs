@@ -4,11 +4,9 @@ use super::motion::{MotionChunk, STEP_S};
 use super::schedule::{ImuInterval, ImuSchedule, Schedule};
 use super::{Outputs, Rig, SimulationSummary};
 use crate::geometry::{Pose, Vector};
-use crate::measurement::{ImuAveraging, ImuNoise, ImuSample, LidarScan};
+use crate::measurement::{ImuNoise, ImuSample, LidarScan};
 use crate::random::Seed;
-use crate::sensors::{
-    Clock, Imu, ImuErrors, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track, ideal_reading,
-};
+use crate::sensors::{Clock, Imu, ImuSampler, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track};
 use crate::time::{Span, Stamp};
 use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
@@ -37,17 +35,15 @@ pub(super) struct Sensors<'a> {
 /// An IMU on a body, with the state from sample to sample.
 struct SimulatedImu {
     samples: ImuSchedule,
-    errors: ImuErrors,
+    sampler: ImuSampler,
     noise: ImuNoise,
-    averaging: ImuAveraging,
     body_from_imu: Pose,
 }
 
 impl SimulatedImu {
     fn new(imu: &Imu, body_from_imu: Pose, schedule: &Schedule, clock: Clock, seed: Seed) -> Self {
         let samples = schedule.samples(imu, clock, seed);
-        let (errors, noise, averaging) = (ImuErrors::new(imu, seed), imu.noise(), imu.averaging());
-        Self { samples, errors, noise, averaging, body_from_imu }
+        Self { samples, sampler: ImuSampler::new(imu, seed), noise: imu.noise(), body_from_imu }
     }
 
     /// The samples that are complete by `until_s`, each with the completion time, s.
@@ -57,8 +53,7 @@ impl SimulatedImu {
 
     fn sample(&mut self, body: &Track, interval: &ImuInterval) -> ImuSample {
         let at = |t_s: f64| body.kinematics(t_s).of_frame(&self.body_from_imu);
-        let ideal = ideal_reading(self.averaging, at, (interval.from_s, interval.to_s));
-        let measured = self.errors.measure(&ideal);
+        let measured = self.sampler.sample(at, (interval.from_s, interval.to_s));
         ImuSample {
             stamp: interval.stamp,
             angular_velocity_rad_per_s: measured.angular_velocity_rad_per_s,

@@ -62,7 +62,7 @@ impl ImuSchedule {
     /// The samples of `imu` on `clock` that end by `end_s`; `seed` determines the jitter of the stamps.
     fn new(imu: &Imu, clock: Clock, seed: Seed, end_s: f64) -> Self {
         // The stamp is `delay` after the middle of the interval.
-        let stamped_after = Span::from_seconds(0.5 * imu.period_s() + imu.delay_s());
+        let stamped_after = Span::from_seconds(0.5 * imu.period_s() + imu.stamp_delay_s());
         let first_stamp = clock.half_tick_from(clock.crystal(0.0) + stamped_after);
         Self {
             instants: PeriodicTimes::new(clock, first_stamp - stamped_after, imu.period_s()),

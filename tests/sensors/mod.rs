@@ -2,5 +2,6 @@
 
 mod canopy;
 mod imu;
+mod imu_output;
 mod lidar;
 mod specs;

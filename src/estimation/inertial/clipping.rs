@@ -9,6 +9,8 @@ const AT_LIMIT: f64 = 1e-3;
 const EQUAL: f64 = 1e-6;
 /// Smallest plausible range limits, rad/s and m/s^2. A flat top of a smaller signal is an effect of the resolution.
 const MIN_LIMIT: (f64, f64) = (1.5, 15.0);
+/// The sample before or after a clipped one is clipped for a part of its interval, if it reads at least this fraction of the limit.
+const PARTLY_CLIPPED: f64 = 0.5;
 /// At least this many samples at one extreme, two of them consecutive, are a flat top.
 const MIN_FLAT_TOP_SAMPLES: usize = 3;
 
@@ -53,6 +55,8 @@ struct AxisExtreme {
     /// Whether two consecutive readings were at the extreme.
     flat: bool,
     was_at_extreme: bool,
+    /// The reading before.
+    last: Option<f64>,
 }
 
 impl AxisExtreme {
@@ -60,13 +64,14 @@ impl AxisExtreme {
     fn add(&mut self, reading: f64) {
         let size = reading.abs();
         if size > self.extreme * (1.0 + EQUAL) {
-            *self = Self { extreme: size, count: 1, flat: false, was_at_extreme: true };
+            *self = Self { extreme: size, count: 1, flat: false, was_at_extreme: true, last: None };
         } else {
             let at_extreme = size >= self.extreme * (1.0 - EQUAL);
             self.count += usize::from(at_extreme);
             self.flat |= at_extreme && self.was_at_extreme;
             self.was_at_extreme = at_extreme;
         }
+        self.last = Some(reading);
     }
 
     /// The range limit, if the readings form a flat top.
@@ -75,7 +80,8 @@ impl AxisExtreme {
     }
 }
 
-/// The axes of `reading`, followed by `ahead`, that are at the limit `data_sheet` or at an observed one from `least` on.
+/// The axes of `reading`, followed by `ahead`, that are at the limit `data_sheet` or at an observed one from `least` on, or next
+/// to such a reading.
 fn clipped_axes(
     axes: &mut [AxisExtreme; 3],
     reading: &Vector,
@@ -84,11 +90,15 @@ fn clipped_axes(
     least: f64,
 ) -> [bool; 3] {
     std::array::from_fn(|k| {
-        axes[k].add(reading[k]);
+        let (x, before) = (reading[k], axes[k].last);
+        axes[k].add(x);
         let mut with_ahead = axes[k];
         ahead.iter().for_each(|next| with_ahead.add(next[k]));
         let shown = with_ahead.limit(least).unwrap_or(f64::INFINITY);
-        reading[k].abs() >= (1.0 - AT_LIMIT) * data_sheet || reading[k].abs() >= (1.0 - EQUAL) * shown
+        let limit = ((1.0 - AT_LIMIT) * data_sheet).min((1.0 - EQUAL) * shown);
+        let next = ahead.first().map(|next| next[k]);
+        let neighbours = [before, next].into_iter().flatten().map(|neighbour| neighbour * x.signum());
+        x.abs() >= limit || x.abs() >= PARTLY_CLIPPED * limit && neighbours.fold(0.0, f64::max) >= limit
     })
 }
 
@@ -103,7 +113,7 @@ impl RangeLimits {
         specific_force.iter().all(|x| x.abs() <= (1.0 + AT_LIMIT) * self.data_sheet.1)
     }
 
-    /// The axes on which `sample`, followed by `ahead`, is clipped.
+    /// The axes on which `sample`, followed by `ahead`, is clipped, at least for a part of its interval.
     pub(super) fn clipped<'a>(&mut self, sample: &ImuSample, ahead: impl Iterator<Item = &'a ImuSample>) -> Clipped {
         let readings = ahead.map(|next| (next.angular_velocity_rad_per_s, next.specific_force_m_per_s2));
         let (gyro_ahead, accel_ahead): (Vec<Vector>, Vec<Vector>) = readings.unzip();

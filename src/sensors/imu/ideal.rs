@@ -7,11 +7,11 @@ use crate::measurement::ImuAveraging;
 /// [`Track`](crate::sensors::Track) interpolates between its nodes differs from the derivative of the attitude by enough to
 /// drift by millimetres in half a minute.
 const INSTANT_S: f64 = 1e-5;
-/// Subintervals of an interval over which the body-axis mean is computed.
-const SUBINTERVALS: u32 = 10;
+/// Subintervals of an interval for the mean in body axes and for saturation within the interval.
+pub(super) const SUBINTERVALS: usize = 10;
 
 /// Angular velocity and specific force in the IMU frame: the content of an IMU sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct InertialReading {
     /// Angular velocity, rad/s.
     pub angular_velocity_rad_per_s: Vector,
@@ -55,19 +55,32 @@ pub fn coning_corrected(start: &Kinematics, end: &Kinematics, dt_s: f64) -> Iner
     }
 }
 
+/// The compensated readings over `count` equal parts of the interval from `from_s` to `to_s`.
+pub(super) fn parts(
+    motion: impl Fn(f64) -> Kinematics,
+    (from_s, to_s): (f64, f64),
+    count: usize,
+) -> impl Iterator<Item = InertialReading> {
+    let dt_s = (to_s - from_s) / count as f64;
+    let mut start = motion(from_s);
+    (1..=count).map(move |k| {
+        let end = motion(from_s + k as f64 * dt_s);
+        let part = coning_corrected(&start, &end, dt_s);
+        start = end;
+        part
+    })
+}
+
 /// The means of angular velocity and specific force over an interval, in the axes of the body.
 ///
 /// A compensated reading differs from the mean by coning and sculling terms proportional to the squared length of the
 /// interval. The average of compensated readings over `n` subintervals has `1 / n^2` of them, which the extrapolation
 /// (Richardson) removes.
 fn body_mean(motion: impl Fn(f64) -> Kinematics, (from_s, to_s): (f64, f64)) -> InertialReading {
-    let n = f64::from(SUBINTERVALS);
-    let dt_s = (to_s - from_s) / n;
-    let nodes: Vec<Kinematics> = (0..=SUBINTERVALS).map(|k| motion(from_s + f64::from(k) * dt_s)).collect();
-    let whole = coning_corrected(&nodes[0], &nodes[nodes.len() - 1], to_s - from_s);
+    let n = SUBINTERVALS as f64;
+    let whole = coning_corrected(&motion(from_s), &motion(to_s), to_s - from_s);
     let (mut rate, mut force) = (Vector::zeros(), Vector::zeros());
-    for pair in nodes.windows(2) {
-        let part = coning_corrected(&pair[0], &pair[1], dt_s);
+    for part in parts(motion, (from_s, to_s), SUBINTERVALS) {
         rate += part.angular_velocity_rad_per_s / n;
         force += part.specific_force_m_per_s2 / n;
     }

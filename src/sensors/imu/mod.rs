@@ -1,13 +1,16 @@
 //! Inertial measurement units: the ideal sample, and the errors.
 
 mod errors;
+mod filter;
 mod ideal;
+mod sampler;
 mod spec;
 mod triad_model;
 
 pub use errors::ImuErrors;
 pub use ideal::{InertialReading, coning_corrected, ideal_reading};
-pub use spec::{AccelSpec, GaussMarkovSpec, GyroSpec, ImuSpec};
+pub use sampler::ImuSampler;
+pub use spec::{AccelSpec, GaussMarkovSpec, GyroSpec, ImuSpec, OutputFilterSpec, WarmUpSpec};
 
 use crate::measurement::{ImuAveraging, ImuNoise};
 use crate::spec::{Source, SpecError};
@@ -25,10 +28,12 @@ impl Imu {
     /// The IMU that `spec`, from `source`, describes.
     ///
     /// # Errors
-    /// If the rate is out of range, stamps are late or early by more than 1 s, or a resolution exceeds the limit.
+    /// If the rate is out of range, stamps are late or early by more than 1 s, a resolution exceeds the limit, or the output
+    /// filter or the warm-up is inconsistent with other keys.
     pub fn new(spec: &ImuSpec, source: &Source) -> Result<Self, SpecError> {
         spec.check(source)?;
-        Ok(Self { gyro: spec.gyro.model(), accel: spec.accel.model(), spec: spec.clone() })
+        let (gyro, accel) = spec.triads();
+        Ok(Self { gyro, accel, spec: spec.clone() })
     }
 
     /// The spec from which it was built.
@@ -42,8 +47,28 @@ impl Imu {
     }
 
     /// Delay of the stamp after the middle of the sample's interval, s on the IMU clock.
-    pub fn delay_s(&self) -> f64 {
+    pub fn stamp_delay_s(&self) -> f64 {
         self.spec.stamp_delay_ms * 1e-3
+    }
+
+    /// Delay of the stamp after the time that the sample describes, s on the IMU clock.
+    ///
+    /// Without an output filter that is the middle of the interval. With one it is the time of a slow signal that has the
+    /// value of the sample.
+    pub fn delay_s(&self) -> f64 {
+        let filter = self.spec.output_filter.as_ref();
+        let of_filter = filter.map_or(0.0, |spec| {
+            let step_s = self.step_s();
+            (0.5 + filter::delay_steps(spec, step_s)) * step_s - 0.5 * self.period_s()
+        });
+        self.stamp_delay_s() + of_filter
+    }
+
+    /// Interval of the readings inside: the step of the output filter, or the sample period, s.
+    pub fn step_s(&self) -> f64 {
+        let filter = self.spec.output_filter.as_ref();
+        let steps = filter.map_or(1, |spec| filter::steps_per_sample(spec, self.spec.rate_hz));
+        self.period_s() / steps as f64
     }
 
     /// How a sample is derived from the motion during its interval.

@@ -24,6 +24,8 @@ pub(super) struct TriadModel {
     pub misalignment: f64,
     pub limit: f64,
     pub resolution: f64,
+    /// Standard deviation of the change of the bias while the sensor warms up, and its time constant.
+    pub warm_up: WarmUp,
 }
 
 impl TriadModel {
@@ -43,12 +45,20 @@ impl TriadModel {
     /// The random walk of the bias that an estimator should expect, unit of the sensor per square root of a second.
     ///
     /// A Gauss-Markov process walks with `s sqrt(2 / T)` over times below T; of bias instability, the walk with the same Allan
-    /// deviation at [`EXPECTED_OVER_S`] is taken.
+    /// deviation at [`EXPECTED_OVER_S`] is taken, and of the warming-up the one with the same change over the first [`EXPECTED_OVER_S`].
     pub fn expected_walk(&self) -> f64 {
         let gauss_markov = self.gauss_markov.map_or(0.0, |process| 2.0 * process.sigma.powi(2) / process.time_s);
         let instability = 3.0 / EXPECTED_OVER_S * (2.0 * LN_2 / PI) * self.instability.powi(2);
-        (self.walk.powi(2) + gauss_markov + instability).sqrt()
+        let warming = self.warm_up.sigma * (1.0 - (-EXPECTED_OVER_S / self.warm_up.time_s).exp());
+        (self.walk.powi(2) + gauss_markov + instability + warming.powi(2) / EXPECTED_OVER_S).sqrt()
     }
+}
+
+/// Exponential change of the bias after the start, in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WarmUp {
+    pub sigma: f64,
+    pub time_s: f64,
 }
 
 /// A first-order Gauss-Markov process in SI units.
