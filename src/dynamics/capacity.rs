@@ -112,18 +112,15 @@ mod tests {
             if let LinkageSpec::Spring { segments: of_spec, .. } = &mut spec.linkage {
                 *of_spec = segments;
             }
-            // Far above every wire's strength, the force law ends at a tenfold length, for any number of segments.
+            // Far above the strength of the wire the force law ends, for any number of segments.
             let elastic = max_head_mass(&spec, &source, &|_, _| None).unwrap().unwrap();
-            assert!(
-                elastic.mass_kg > 80.0 && elastic.reason.contains("stretches the spring"),
-                "{segments}: {elastic:?}"
-            );
+            assert!(elastic.mass_kg > 30.0 && elastic.reason.contains("deforms the coils"), "{segments}: {elastic:?}");
             // A limit of the rest pose: 200 mm below the foot; without load the head would be 160 mm below it.
             let deep = |_: &Body, rest: &Pose| (rest.translation.z < -0.2).then(|| "too deep".to_owned());
             let limit = max_head_mass(&spec, &source, &deep).unwrap().unwrap();
             // k = 845.9 N/m, extended by 40 mm by the head and half of the wire.
             let expected_kg = 0.040 * 845.9 / 9.80665 - 0.5 * 0.0232;
-            assert!((limit.mass_kg / expected_kg - 1.0).abs() < 2e-3, "{limit:?}, expected {expected_kg}");
+            assert!((limit.mass_kg / expected_kg - 1.0).abs() < 1e-2, "{limit:?}, expected {expected_kg}");
             assert_eq!(limit.reason, "too deep");
         }
     }

@@ -44,8 +44,10 @@ pub struct SpringElementSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum SpringMassSpec {
-    /// The wire is massless.
+    /// As `included` if the density of the material is known, and as `neglected` otherwise.
     #[default]
+    IfKnown,
+    /// The wire is massless.
     Neglected,
     /// The wire moves with the deflection of the spring's top, and half of the wire's weight acts on the top.
     Included,

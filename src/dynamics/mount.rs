@@ -155,15 +155,15 @@ impl CompliantMount<'_> {
         let design = parameters.spring.design().map_err(|error| invalid(&error))?;
         let wire_mass_kg = match parameters.mass {
             SpringMassSpec::Neglected => None,
-            SpringMassSpec::Included => {
-                let mass_kg = parameters.spring.wire_mass_kg().map_err(|error| invalid(&error))?;
-                Some(mass_kg.ok_or_else(|| {
-                    let message = "the mass of the spring is unknown: use a coil whose material has a density_kg_per_m3, \
-                                   or omit spring_mass";
-                    SpecError::about(source, "spring_mass", message)
-                })?)
+            SpringMassSpec::IfKnown | SpringMassSpec::Included => {
+                parameters.spring.wire_mass_kg().map_err(|error| invalid(&error))?
             }
         };
+        if parameters.mass == SpringMassSpec::Included && wire_mass_kg.is_none() {
+            let message = "the mass of the spring is unknown: use a coil whose material has a density_kg_per_m3, or omit \
+                           spring_mass";
+            return Err(SpecError::about(source, "spring_mass", message));
+        }
         if let Some(cable) = parameters.cable {
             let cord = Cord::through(cable, &parameters.ends).ok_or_else(|| {
                 let message = format!(
@@ -209,17 +209,18 @@ impl CompliantMount<'_> {
 
     /// The equilibrium of the undamped head with `weight` times the real weight: law, pose and stiffness.
     ///
-    /// The stiffness is that of [`Statics::find_equilibrium`]. A single spring carries the component of the weight
-    /// along the spring. With several elements, the load of each coil is iterated until it equals the load in
+    /// The stiffness is that of [`Statics::find_equilibrium`]. A single spring carries the component along the spring of this
+    /// weight and of half of its own wire. With several elements, the load of each coil is iterated until it equals the load in
     /// equilibrium; a spring given by a stiffness matrix carries an equal fraction of the weight.
     pub fn equilibrium(&self, weight: f64) -> Result<(ForceLaw, Pose, Matrix6), NoEquilibrium> {
         let gravity_in_base = gravity_in_world();
-        let weight_n = gravity_in_base * (weight * self.body.mass_kg);
         let fraction = 1.0 / self.springs.len().max(1) as f64;
-        let even = self.springs.iter().map(|s| -(s.ends.base_from_foot.rotation.inverse() * weight_n).z * fraction);
+        let even = self.springs.iter().map(|spring| {
+            let carried_kg = weight * self.body.mass_kg * fraction + 0.5 * spring.wire_mass_kg.unwrap_or(0.0);
+            -(spring.ends.base_from_foot.rotation.inverse() * gravity_in_base).z * carried_kg
+        });
         let mut loads_n: Vec<f64> = even.collect();
-        let load_is_known =
-            self.is_one_spring() && self.cords.is_empty() && self.springs.iter().all(SpringMount::is_light);
+        let load_is_known = self.is_one_spring() && self.cords.is_empty();
         let tolerance_n = 1e-6 * self.body.mass_kg * gravity_in_base.norm();
         for _ in 0..MAX_ITERATIONS {
             let mut law = self.law(&loads_n)?;
@@ -295,10 +296,6 @@ impl CompliantMount<'_> {
 }
 
 impl SpringMount {
-    fn is_light(&self) -> bool {
-        self.wire_mass_kg.is_none()
-    }
-
     fn loaded(&self, load_n: f64, segments: usize) -> Result<MountedSpring, ElasticityError> {
         let spring = self.design.loaded_spring(load_n, segments)?;
         let mass = match (&self.design, self.wire_mass_kg) {

@@ -101,7 +101,7 @@ impl Overlap {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Moduli, SpringDesign};
+    use super::super::{Moduli, Spring};
     use super::*;
     use crate::geometry::{Pose, Rotation, Vector};
     use approx::assert_relative_eq;
@@ -143,10 +143,11 @@ mod tests {
     }
 
     /// 12 coils of 3 mm in 46 mm are closed after 10 mm.
-    fn short_spring(segments: usize) -> (Coil, super::super::Spring) {
+    fn short_spring(segments: usize) -> (Coil, Spring) {
         let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
         let coil = Coil::new(0.025, 0.003, 12.0, 0.046, moduli).unwrap();
-        (coil, SpringDesign::Coil(coil).loaded_spring(4.0, segments).unwrap())
+        let column = coil.under_load(4.0).unwrap();
+        (coil, Spring::of_column(&column, segments).unwrap().with_contact(&coil, 4.0))
     }
 
     #[test]

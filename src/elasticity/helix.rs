@@ -19,6 +19,9 @@ use nalgebra::{Matrix2, SMatrix, UnitQuaternion, Vector2};
 
 /// Maximum Newton iterations for the loaded helix.
 const MAX_ITERATIONS: usize = 50;
+/// Largest turn of the axis relative to the clamped wire, rad, and change of the radius by its value. Springs of steel yield at a
+/// third of it.
+const MAX_CHANGE: f64 = 0.35;
 
 /// The helix under an axial load: a state of constant strain.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,7 +125,7 @@ impl Helix {
             if change.amax() < 1e-13 {
                 break;
             }
-            if iteration > MAX_ITERATIONS || x.amax() > 0.5 || x.amax().is_nan() {
+            if iteration > MAX_ITERATIONS || x.amax() > MAX_CHANGE || x.amax().is_nan() {
                 return Err(out_of_range());
             }
         }

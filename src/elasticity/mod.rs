@@ -5,8 +5,8 @@
 //! top. Both are columns of six in the axes of the base, translation first.
 //!
 //! - [`Coil`]: a helical spring as a column with axial, torsional, bending and shear rigidity.
-//! - [`loaded_stiffness`]: the effect of an axial load on the stiffness of such a column (Haringx), which heads use.
-//! - [`Spring::of_coil`]: the same coil as an elastic rod along its wire, with couplings; heads do not use it yet.
+//! - [`loaded_stiffness`]: the effect of an axial load on the stiffness of such a column (Haringx), and its buckling.
+//! - [`Spring::of_coil`]: the same coil as an elastic rod along its wire, with couplings: the force law of heads.
 //! - [`Deformation`]: the displacement of the top in corotational coordinates.
 //! - [`Spring`]: the force law for large rotations: one or several elements, each with a potential in those
 //!   coordinates, so that energy is conserved exactly; the nodes between elements are massless and in equilibrium. Coils that

@@ -70,7 +70,7 @@ impl Coil {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Moduli, SpringDesign};
+    use super::super::{Moduli, Spring};
     use super::*;
     use crate::geometry::{Rotation, Vector};
     use approx::assert_relative_eq;
@@ -84,7 +84,7 @@ mod tests {
         // Neighbouring wires on the inner side of an arc of length L and angle phi are `(L - R phi) / n` apart. n = 12, R = 12.5 mm,
         // and the wire fills 36 mm.
         let coil = coil();
-        let spring = SpringDesign::Coil(coil).loaded_spring(0.0, 4).unwrap();
+        let spring = Spring::of_column(&coil.under_load(0.0).unwrap(), 4).unwrap();
         for phi in [0.3, 1.0, 2.0] {
             let radius_m = 0.12 / phi;
             let chord = Vector::new(radius_m * (1.0 - f64::cos(phi)), 0.0, radius_m * f64::sin(phi));
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn the_moment_at_the_foot_of_a_cantilever_is_force_times_length() {
         let coil = coil();
-        let spring = SpringDesign::Coil(coil).loaded_spring(0.0, 2).unwrap();
+        let spring = Spring::of_column(&coil.under_load(0.0).unwrap(), 2).unwrap();
         let stiffness = super::super::loaded_stiffness(&coil.under_load(0.0).unwrap()).unwrap();
         // The displacement of the top under a lateral force of 0.01 N.
         let moved = stiffness.try_inverse().unwrap() * Vector6::new(0.01, 0.0, 0.0, 0.0, 0.0, 0.0);

@@ -211,9 +211,7 @@ impl SpringDesign {
     /// When the spring cannot carry the load, or cannot be divided into `segments`.
     pub fn loaded_spring(&self, load_n: f64, segments: usize) -> Result<Spring, ElasticityError> {
         match self {
-            SpringDesign::Coil(coil) => {
-                Ok(Spring::of_column(&coil.under_load(load_n)?, segments)?.with_contact(coil, load_n))
-            }
+            SpringDesign::Coil(coil) => Ok(Spring::of_coil(coil, load_n, segments)?.with_contact(coil, load_n)),
             SpringDesign::Stiffness { length_m, at_top } => match segments {
                 1 => Spring::from_stiffness(*length_m, load_n, at_top),
                 _ => Err(ElasticityError::CannotBeDivided { segments }),

@@ -76,9 +76,9 @@ fn the_page_of_a_hanging_head_has_a_longer_spring_and_six_named_modes() {
     let names: Vec<_> =
         figures["modes"].as_array().unwrap().iter().map(|mode| mode["name"].as_str().unwrap()).collect();
     assert_eq!(page.matches("name=\"mode\"").count(), 1 + names.len());
-    for name in ["rocking about x", "rocking about y", "sway along x", "sway along y", "bounce along z", "yaw about z"]
-    {
-        assert!(names.contains(&name), "{name} is not in {names:?}");
+    // The helix has no axis of symmetry, so that it rocks and sways about axes between x and y.
+    for (start, count) in [("rocking about", 2), ("sway along", 2), ("bounce along z", 1), ("yaw about z", 1)] {
+        assert_eq!(names.iter().filter(|name| name.starts_with(start)).count(), count, "{start}: {names:?}");
     }
     assert!(page.contains("Reference point: the centre of mass of the head"));
     assert!(out.join("modes.svg").is_file());

@@ -64,9 +64,7 @@ fn modes_of_other_linkages_decay_as_in_the_linear_model() {
         built(&text.replace("rocking: 0.0, sway: 0.0, bounce: 0.0, yaw: 0.0", ratios)).unwrap()
     };
     let springs: String = [[0.04, 0.0], [-0.02, 0.03], [-0.02, -0.03]]
-        .map(|[x, y]| {
-            upright_spring([x, y, 0.0], [x, y, -0.04]).replace("segments: 1,", "segments: 1, spring_mass: included,")
-        })
+        .map(|[x, y]| upright_spring([x, y, 0.0], [x, y, -0.04]).replace("neglected", "included"))
         .concat();
     let wire =
         ReferenceHead { damping: [0.02, 0.03, 0.04, 0.05], more: "spring_mass: included,", ..ReferenceHead::default() };

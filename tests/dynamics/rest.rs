@@ -30,13 +30,16 @@ fn rocking_frequencies_agree_with_reference_values_for_any_number_of_segments() 
 
 #[test]
 fn the_static_deflection_is_weight_over_axial_stiffness() {
-    // G d^4 / (8 D^3 n) = 79.3e9 0.003^4 / (8 0.025^3 12) = 4282.2 N/m under 0.40 kg: 0.916 mm.
-    let model = ReferenceHead::default().model();
+    // G d^4 / (8 D^3 n) = 79.3e9 0.003^4 / (8 0.025^3 12) = 4282.2 N/m under 0.40 kg: 0.916 mm, to 2 % as the formula neglects
+    // the pitch of the coils and the shear of the wire.
     let sag = 0.40 * G / 4282.2;
-    let rest = model.base_from_head_at_rest();
-    assert_relative_eq!(rest.translation.vector, Vector::new(0.0, 0.0, 0.12 - sag), epsilon = 1e-8);
-    let hanging = ReferenceHead { hanging: true, ..ReferenceHead::default() }.model();
-    assert_relative_eq!(hanging.base_from_head_at_rest().translation.z, -(0.12 + sag), epsilon = 1e-8);
+    for (hanging, length_m) in [(false, 0.12 - sag), (true, 0.12 + sag)] {
+        let model = ReferenceHead { hanging, ..ReferenceHead::default() }.model();
+        let rest = model.base_from_head_at_rest().translation.vector;
+        assert_relative_eq!(rest.z.abs(), length_m, epsilon = 0.02 * sag);
+        // The couplings shift it by tenths of a millimetre.
+        assert!(rest.xy().norm() < 5e-4, "{rest}");
+    }
 }
 
 #[test]
@@ -54,9 +57,11 @@ fn a_head_on_a_tilted_base_rests_at_the_inclination_of_the_loaded_column() {
     let stiffness = Matrix2::new(k[(0, 0)], k[(0, 4)], k[(0, 4)], k[(4, 4)] - weight * h);
     let expected = stiffness.try_inverse().unwrap() * Vector2::new(1.0, h) * weight * tilt;
     let first = base.inv_mul(&path[0].head.world_from_body);
-    // The error is of second order in the inclination of 0.01 rad.
-    assert_relative_eq!(first.translation.x, expected.x, max_relative = 1e-3);
-    assert_relative_eq!(first.rotation.scaled_axis().y, expected.y, max_relative = 1e-3);
+    // Relative to the rest on an upright base. A percent of stiffness is two of the deflection, because gravity takes half of it.
+    let upright = model.base_from_head_at_rest();
+    let (shifted, turned) = (first.translation.x - upright.translation.x, first.rotation * upright.rotation.inverse());
+    assert_relative_eq!(shifted, expected.x, max_relative = 0.04);
+    assert_relative_eq!(turned.scaled_axis().y, expected.y, max_relative = 0.04);
     for state in &path {
         let moved = base.inv_mul(&state.head.world_from_body).inv_mul(&first);
         assert!(moved.translation.vector.norm() < 1e-10 && moved.rotation.angle() < 1e-9, "{} s: {moved}", state.t_s);

@@ -1,8 +1,8 @@
 //! Stress in the wire of a helical spring, and the load on it.
 
-use crate::dynamics::{Body, HeadSpec, HeadState, LinkageSpec};
+use crate::dynamics::{Body, HeadSpec, HeadState, LinkageSpec, SpringMassSpec};
 use crate::elasticity::{Material, SpringSpec};
-use crate::geometry::{Pose, Vector, gravity_in_world};
+use crate::geometry::{Kinematics, Pose, Vector, gravity_in_world};
 use std::f64::consts::{PI, TAU};
 
 /// The wire of a coil.
@@ -119,17 +119,26 @@ pub struct SpringMounting {
     base_from_foot: Pose,
     head_from_top: Pose,
     body: Body,
+    /// Mass of the wire, if the head models it; else 0.
+    wire_mass_kg: f64,
 }
 
 impl SpringMounting {
     /// The mounting of a head on a single spring; `None` for other linkages.
     pub fn of(spec: &HeadSpec, body: &Body) -> Option<Self> {
-        let LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } = &spec.linkage else { return None };
+        let LinkageSpec::Spring { spring, base_from_spring, head_from_spring, spring_mass, .. } = &spec.linkage else {
+            return None;
+        };
+        let wire_mass_kg = match spring_mass {
+            SpringMassSpec::Neglected => None,
+            SpringMassSpec::IfKnown | SpringMassSpec::Included => spring.wire_mass_kg().ok()?,
+        };
         let end = Pose::translation(0.0, 0.0, spring.end_length_m().ok()?);
         Some(Self {
             base_from_foot: base_from_spring.pose() * end,
             head_from_top: head_from_spring.pose() * end.inverse(),
             body: *body,
+            wire_mass_kg: wire_mass_kg.unwrap_or(0.0),
         })
     }
 
@@ -139,7 +148,8 @@ impl SpringMounting {
         (top - self.base_from_foot.translation.vector).norm()
     }
 
-    /// Loads on the foot and the top of the spring: weight and inertial force of the head (d'Alembert).
+    /// Loads on the foot and the top of the spring: weight and inertial force of the head and of half of the wire, at the top
+    /// (d'Alembert).
     pub fn ends(&self, state: &HeadState) -> [WireLoad; 2] {
         let centre =
             state.head.of_frame(&Pose::from_parts(self.body.centre_of_mass_in_head.into(), Default::default()));
@@ -149,12 +159,14 @@ impl SpringMounting {
         let omega = in_head(state.head.angular_velocity_in_world);
         let inertia = self.body.inertia_in_head;
         let spin = inertia * in_head(state.head.angular_acceleration_in_world) + omega.cross(&(inertia * omega));
-        let feet = [state.base.world_from_body * self.base_from_foot, state.head.world_from_body * self.head_from_top];
-        feet.map(|world_from_end| {
-            let arm = centre.world_from_body.translation.vector - world_from_end.translation.vector;
-            let moment = arm.cross(&force) - rotation * spin;
+        let top = state.head.of_frame(&self.head_from_top);
+        let of_wire = (gravity_in_world() - top.acceleration_in_world) * (0.5 * self.wire_mass_kg);
+        let ends = [state.base.world_from_body * self.base_from_foot, top.world_from_body];
+        ends.map(|world_from_end| {
+            let arm = |point: &Kinematics| point.world_from_body.translation.vector - world_from_end.translation.vector;
+            let moment = arm(&centre).cross(&force) + arm(&top).cross(&of_wire) - rotation * spin;
             let in_end = world_from_end.rotation.inverse();
-            WireLoad { force: in_end * force, moment: in_end * moment }
+            WireLoad { force: in_end * (force + of_wire), moment: in_end * moment }
         })
     }
 
