@@ -2,6 +2,7 @@
 
 mod capacity;
 pub mod design;
+mod excited_mode;
 mod export;
 mod fatigue;
 mod margins;

@@ -10,10 +10,13 @@ const TOLERANCE_DEG: f64 = 10.0;
 const ROTATION_LENGTH_M: f64 = 0.1;
 /// A rocking mode rotates by at least this fraction of its displacement; else it only shifts.
 const LEAST_ROTATION: f64 = 0.05;
+/// A sway is mainly horizontal if this fraction of its displacement is.
+const MAINLY: f64 = 0.5;
 
 /// The name of a mode with its direction, such as "rocking about y" or "bounce along z".
 ///
-/// Axes are those of the base. Rocking and yaw rotate about the direction, sway and bounce move the centre of mass along it.
+/// Axes are those of the base. Rocking and yaw rotate about the direction, sway and bounce move the centre of mass along it. Of a sway
+/// that is mainly horizontal, the direction is the horizontal one: a coil couples it to bounce.
 pub fn mode_name(mode: &Mode) -> String {
     let (shift, turn) = split(&mode.shape);
     let turns = match mode.kind {
@@ -21,7 +24,12 @@ pub fn mode_name(mode: &Mode) -> String {
         ModeKind::Yaw => true,
         ModeKind::Sway | ModeKind::Bounce => false,
     };
-    let (word, along) = if turns { ("about", turn) } else { ("along", shift) };
+    let horizontal = Vector::new(shift.x, shift.y, 0.0);
+    let moved = match mode.kind {
+        ModeKind::Sway if horizontal.norm() > MAINLY * shift.norm() => horizontal,
+        _ => shift,
+    };
+    let (word, along) = if turns { ("about", turn) } else { ("along", moved) };
     format!("{} {word} {}", mode.kind.name(), direction(&along))
 }
 
@@ -69,6 +77,8 @@ mod tests {
         let expected = "rocking about an axis 45\u{b0} from x towards -y";
         assert_eq!(name(ModeKind::Rocking, [0.0; 3], [-1.0, 1.0, 0.0]), expected);
         assert_eq!(name(ModeKind::Bounce, [0.6, 0.0, 0.8], [0.0; 3]), "bounce along (0.60, 0.00, 0.80)");
+        assert_eq!(name(ModeKind::Sway, [0.9, 0.0, -0.6], [0.0; 3]), "sway along x");
+        assert_eq!(name(ModeKind::Sway, [0.3, 0.0, 0.8], [0.0; 3]), "sway along (0.35, 0.00, 0.94)");
     }
 
     #[test]

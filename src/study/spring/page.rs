@@ -1,15 +1,15 @@
 //! The page of a spring, or another linkage, under a head.
 
+use super::excited_mode::{ExcitedMode, along_axes};
 use super::mode_figure::{displayed_shape, ratio};
 use super::{CoilReport, RestReport, Shake, SpringReport, mode_name, mode_table, properties, stiffness_table};
-use crate::dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, Mode, PartSpec};
+use crate::dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, PartSpec};
 use crate::elasticity::SpringDesign;
 use crate::geometry::{Pose, Vector};
 use crate::motion::Axis;
 use crate::report::page::{NamedValue, NotedTable, PageTable, ShownMode, SpringPage, SpringView};
 use crate::study::StudyError;
 use crate::study::page::links;
-use nalgebra::Complex;
 
 /// The page as HTML; the same report gives the same bytes.
 ///
@@ -149,24 +149,24 @@ fn unloaded_pose(linkage: &LinkageSpec) -> Result<Pose, StudyError> {
     })
 }
 
-/// The modes with their amplitudes in the linear response to the shake.
+/// The modes with their amplitudes in the linear response to the shake; close pairs along the axes.
 fn modes(head: &HeadModel, shake: &Shake) -> Vec<ShownMode> {
     let points = GainPoints {
         base_in_base: head.default_points().base_in_base,
         head_in_head: head.body().centre_of_mass_in_head,
     };
     let per_base = head.frequency_response(&points).modal_amplitudes(Axis::Pitch, shake.frequency_of(head));
-    let shown = |(mode, per_base): (&Mode, &Complex<f64>)| {
+    let shown = |ExcitedMode { mode, amplitude }: &ExcitedMode| {
         let displayed = displayed_shape(mode);
         ShownMode {
             name: mode_name(mode),
             frequency_hz: mode.frequency_hz,
             details: format!("{:.3} Hz, damping ratio {}", mode.frequency_hz, ratio(mode.damping_ratio)),
             shape: displayed.into(),
-            shaken: per_base.norm() * shake.base_rad() * mode.shape.norm() / displayed.norm(),
+            shaken: amplitude.norm() * shake.base_rad() * mode.shape.norm() / displayed.norm(),
         }
     };
-    head.linear_modes().iter().zip(&per_base).map(shown).collect()
+    along_axes(head.linear_modes(), per_base.as_slice()).iter().map(shown).collect()
 }
 
 fn shake_in_words(head: &HeadModel, shake: &Shake) -> String {
@@ -178,7 +178,8 @@ fn tables(head: Option<&HeadModel>, report: &SpringReport) -> Vec<NotedTable> {
     let mut tables = Vec::new();
     if !report.modes.is_empty() {
         let note = "Undamped frequency. The shape is the displacement of the centre of mass (m) and the rotation (rad) in the \
-                    axes of the base; its largest entry is 1.";
+                    axes of the base; its largest entry is 1. In the picture, modes of the same kind within 1 % in frequency \
+                    are turned to the axes.";
         tables.push(noted(mode_table(report, |mode| &mode.name), note));
     }
     if let (Some(stiffness), Some(head)) = (&report.stiffness, head) {
@@ -216,19 +217,18 @@ mod tests {
         let head = HeadModel::new(&spec, &source).unwrap();
         let rocking_hz = head.linear_modes()[0].frequency_hz;
         let shown = modes(&head, &Shake { pitch_deg: 2.0, frequency_hz: Some(rocking_hz) });
-        // The rotation about `axis` of all modes of a kind, which are in phase or nearly so.
-        let turn_deg = |kind: &str, axis: usize| {
-            let of_kind = shown.iter().filter(|mode| mode.name.starts_with(kind));
-            of_kind.map(|mode| (mode.shaken * mode.shape[3 + axis].abs()).to_degrees()).sum::<f64>()
+        let turn_deg = |name: &str| {
+            let mode = shown.iter().find(|mode| mode.name == name).unwrap();
+            (mode.shaken * Vector::from_column_slice(&mode.shape[3..]).norm()).to_degrees()
         };
         // Mode: rotation a about y and displacement 0.131 a of the centre, 0.1826 m above the foot; m = 0.35 kg, I about the
         // centre 5.874e-4 kg m^2 from the three blocks. Modal mass m 0.131^2 + I = 6.594e-3. A nod b moves the centre by
         // 0.1826 b and tilts the supporting force m g: with w = 2 pi 1.25 and the damping ratio 0.08 the amplitude is
         // ((m 0.131 0.1826 + I) w^2 + 0.131 m g) / (6.594e-3 w^2 2 0.08) b = 15.33 b.
-        let rocking_deg = turn_deg("rocking", 1);
+        let rocking_deg = turn_deg("rocking about y");
         assert!((rocking_deg / 30.66 - 1.0).abs() < 0.03, "{rocking_deg}");
-        for (kind, axis) in [("yaw", 2), ("sway", 0)] {
-            assert!(turn_deg(kind, axis) < 0.01 * rocking_deg, "{kind}: {}", turn_deg(kind, axis));
+        for name in ["rocking about x", "yaw about z", "sway along y"] {
+            assert!(turn_deg(name) < 0.02 * rocking_deg, "{name}: {}", turn_deg(name));
         }
     }
 }
