@@ -5,7 +5,7 @@ use super::bars::WorkBar;
 use super::{Completion, coverage_text, output, quantity};
 use clap::Args;
 use std::path::Path;
-use zsim::dynamics::{self, HeadModel};
+use zsim::dynamics::{self, ContactWatch, HeadModel, HeadState};
 use zsim::motion;
 use zsim::random::Seed;
 use zsim::report;
@@ -64,10 +64,16 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         ..CoveragePlan::default()
     };
     let bar = WorkBar::new(global, "swinging");
-    let seen = coverage(&head, motion.as_ref(), &lidar, &plan, |state| bar.set_fraction(state.t_s / until_s))?;
+    let mut contact = ContactWatch::new(&head);
+    let mut watch = |state: &HeadState| {
+        bar.set_fraction(state.t_s / until_s);
+        contact.check(state.t_s, &state.base, &state.head);
+    };
+    let seen = coverage(&head, motion.as_ref(), &lidar, &plan, &mut watch)?;
     bar.set_phase("plotting");
     let folder =
         arguments.out.out.as_ref().map(|wanted| write_results(&seen, wanted, arguments.out.force)).transpose()?;
+    contact.contact().iter().for_each(|contact| bar.note(&contact.warning()));
     drop(bar);
     output::print_result(global, &text(&seen), serde_json::to_value(&seen)?, folder.as_deref())?;
     Ok(Completion::Done)

@@ -83,6 +83,8 @@ pub enum Measure {
     RateP99DegPerS,
     /// Fraction of the time in which at least one axis of the gyroscope is saturated.
     Saturated,
+    /// Time in which coils of the spring touch, s. A design should have none: the motion after a clash is approximate.
+    CoilContactS,
     /// Frequency of the slowest mode, Hz.
     RockingHz,
     /// Peak gain, head over base: of the pitch rate in closed form, along or about the axis of a gain measurement.
@@ -134,7 +136,7 @@ impl Origin {
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 40] = [
+    pub const ALL: [Self; 41] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
@@ -167,6 +169,7 @@ impl Measure {
         Self::RateDegPerS,
         Self::RateP99DegPerS,
         Self::Saturated,
+        Self::CoilContactS,
         Self::RockingHz,
         Self::PeakGain,
         Self::SagMm,
@@ -210,9 +213,7 @@ impl Measure {
             Self::DriftOverPath => ("drift_over_path", "drift/path", "Drift over the length of the path (%)", "%", 1e2),
             Self::CloudSigmaM => ("cloud_sigma_m", "cloud", "Standard deviation of the cloud (mm)", "mm", 1e3),
             Self::CloudBiasM => ("cloud_bias_m", "cloud bias", "Bias of the cloud (mm)", "mm", 1e3),
-            Self::CloudOverTruth => {
-                ("cloud_over_truth", "cloud/truth", "Ratio of the cloud's deviation to that by the truth", "1", 1.0)
-            }
+            Self::CloudOverTruth => ("cloud_over_truth", "cloud/truth", "Deviation over that by the truth", "1", 1.0),
             Self::ReferenceSigmaM => {
                 ("reference_sigma_m", "from reference", "Standard deviation from the reference cloud (mm)", "mm", 1e3)
             }
@@ -230,6 +231,7 @@ impl Measure {
             Self::RateDegPerS => ("rate_deg_per_s", "rate", "Maximum rate (°/s)", "deg/s", 1.0),
             Self::RateP99DegPerS => ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (°/s)", "deg/s", 1.0),
             Self::Saturated => ("saturated", "saturated", "Time with a saturated gyroscope (%)", "%", 1e2),
+            Self::CoilContactS => ("coil_contact_s", "contact", "Time with touching coils (s)", "s", 1.0),
             Self::RockingHz => ("rocking_hz", "rocking", "Rocking frequency (Hz)", "Hz", 1.0),
             Self::PeakGain => ("peak_gain", "gain", "Peak gain", "1", 1.0),
             Self::SagMm => ("sag_mm", "sag", "Static compression (mm)", "mm", 1.0),
@@ -296,9 +298,12 @@ impl Measure {
             Self::CloudOverTruth | Self::ReferenceSigmaM | Self::ReferenceBiasM | Self::ReferenceRmseM => {
                 Origin::Reference
             }
-            Self::FractionSeen | Self::CoveredS | Self::DensityPerSrS | Self::RateP99DegPerS | Self::Saturated => {
-                Origin::Swing
-            }
+            Self::FractionSeen
+            | Self::CoveredS
+            | Self::DensityPerSrS
+            | Self::RateP99DegPerS
+            | Self::Saturated
+            | Self::CoilContactS => Origin::Swing,
             Self::FieldOfViewDeg | Self::RateDegPerS => Origin::SwingOrClosedForm,
             Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => {
                 Origin::ClosedForm

@@ -8,6 +8,7 @@ use super::reference_inputs::ReferenceInputs;
 use super::reference_system::ReferenceMap;
 use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
+use crate::dynamics::{ContactWatch, HeadState};
 use crate::estimation::EstimatorSpec;
 use crate::evaluation::MapKnowledge;
 use crate::measurement::Calibration;
@@ -143,7 +144,7 @@ impl TemporaryRecording {
             }
         }
         let figure = |measure: &Measure| {
-            let by_swing = swing.as_ref().and_then(|coverage| swing_figure(*measure, coverage));
+            let by_swing = swing.as_ref().and_then(|swing| swing_figure(*measure, swing));
             let by_map = || map_errors.as_ref().and_then(|errors| timing::figure(errors, *measure));
             by_swing.or_else(by_map).or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
         };
@@ -234,8 +235,8 @@ impl TemporaryRecording {
         Ok(map)
     }
 
-    /// Coverage of the lidar and use of the gyroscope's range, from 5 s (after the rest at the start) to the run's end.
-    fn swing(&self) -> Result<Coverage, StudyError> {
+    /// The swing from 5 s (after the rest at the start) to the run's end.
+    fn swing(&self) -> Result<Swing, StudyError> {
         let simulation = &self.simulation;
         let usual = CoveragePlan::default();
         let plan = CoveragePlan {
@@ -243,7 +244,11 @@ impl TemporaryRecording {
             rate_limit_deg_per_s: simulation.imu().spec().gyro.limit_deg_per_s,
             ..usual
         };
-        coverage(simulation.head(), simulation.motion(), simulation.lidar(), &plan, |_| ())
+        let head = simulation.head();
+        let mut contact = ContactWatch::new(head);
+        let mut check = |state: &HeadState| contact.check(state.t_s, &state.base, &state.head);
+        let coverage = coverage(head, simulation.motion(), simulation.lidar(), &plan, &mut check)?;
+        Ok(Swing { coverage, coil_contact_s: contact.contact().map_or(0.0, |contact| contact.contact_s) })
     }
 }
 
@@ -254,7 +259,14 @@ struct Compared {
     reference: Option<Arc<ReferenceMap>>,
 }
 
-fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
+/// The swing of the head without rays.
+struct Swing {
+    /// Coverage of the lidar and use of the gyroscope's range.
+    coverage: Coverage,
+    coil_contact_s: f64,
+}
+
+fn swing_figure(measure: Measure, Swing { coverage, coil_contact_s }: &Swing) -> Option<f64> {
     match measure {
         Measure::FractionSeen => Some(coverage.fraction_seen),
         Measure::CoveredS => Some(coverage.covered_s),
@@ -263,6 +275,7 @@ fn swing_figure(measure: Measure, coverage: &Coverage) -> Option<f64> {
         Measure::RateDegPerS => Some(coverage.gyro.most_deg_per_s),
         Measure::RateP99DegPerS => Some(coverage.gyro.p99_deg_per_s),
         Measure::Saturated => Some(coverage.gyro.saturated),
+        Measure::CoilContactS => Some(*coil_contact_s),
         _ => None,
     }
 }
