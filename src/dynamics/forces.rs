@@ -145,8 +145,8 @@ impl RelativePose {
     ///
     /// The twist is relative to the base, in the axes of the world.
     pub fn rate_by_twist(&self) -> Matrix6 {
-        let by_velocity = self.deformation.jacobian * self.axes.transpose();
-        let by_turning = self.deformation.coupling * self.axes.transpose() - by_velocity * skew(&self.lever);
+        let by_velocity = self.deformation.jacobian() * self.axes.transpose();
+        let by_turning = self.deformation.coupling() * self.axes.transpose() - by_velocity * skew(&self.lever);
         blocks(&by_velocity, &by_turning, &Matrix::zeros(), &by_velocity)
     }
 

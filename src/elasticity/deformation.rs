@@ -18,45 +18,70 @@ use crate::geometry::{Matrix, Pose, Vector, skew};
 pub struct Deformation {
     /// The coordinates `(a, theta)`, m and rad.
     pub coordinates: Vector6,
-    /// The Jacobian block `A`.
-    pub jacobian: Matrix,
-    /// The Jacobian block `W`.
-    pub coupling: Matrix,
+    position: Vector,
+    theta: Vector,
+    /// The coefficient `c` of `A = 1 - [theta]/2 + c [theta]^2`, and `(dc/dt)/t` for the angle t.
+    series: (f64, f64),
+    /// `theta x p` and `theta x (theta x p)`.
+    turned: (Vector, Vector),
 }
 
 impl Deformation {
     /// Computes the deformation for a top at `base_from_top`.
     pub fn of(base_from_top: &Pose) -> Self {
-        let p = base_from_top.translation.vector;
+        let position = base_from_top.translation.vector;
         let theta = base_from_top.rotation.scaled_axis();
-        let (c, c_slope) = cotangent_series(theta.norm_squared());
-        let hat = skew(&theta);
-        let turned = theta.cross(&p);
-        let twice = theta.cross(&turned);
-        let jacobian = Matrix::identity() - hat * 0.5 + hat * hat * c;
-        let hat_p = skew(&p);
-        let by_theta = hat_p * 0.5 - (skew(&turned) + hat * hat_p) * c + twice * theta.transpose() * c_slope;
-        let a = p - turned * 0.5 + twice * c;
-        Self { coordinates: stack(&a, &theta), jacobian, coupling: by_theta * jacobian }
+        let series = cotangent_series(theta.norm_squared());
+        let once = theta.cross(&position);
+        let turned = (once, theta.cross(&once));
+        let a = position - turned.0 * 0.5 + turned.1 * series.0;
+        Self { coordinates: stack(&a, &theta), position, theta, series, turned }
+    }
+
+    /// The Jacobian block `A`.
+    pub fn jacobian(&self) -> Matrix {
+        let hat = skew(&self.theta);
+        Matrix::identity() - hat * 0.5 + hat * hat * self.series.0
+    }
+
+    /// The Jacobian block `W`.
+    pub fn coupling(&self) -> Matrix {
+        let (c, c_slope) = self.series;
+        let hat_p = skew(&self.position);
+        let by_theta = hat_p * 0.5 - (skew(&self.turned.0) + skew(&self.theta) * hat_p) * c
+            + self.turned.1 * self.theta.transpose() * c_slope;
+        by_theta * self.jacobian()
     }
 
     /// The rate of the coordinates for a twist of the top, in the axes of the base.
     pub fn rate(&self, twist: &Vector6) -> Vector6 {
         let (v, w) = split(twist);
-        stack(&(self.jacobian * v + self.coupling * w), &(self.jacobian * w))
+        let jacobian = self.jacobian();
+        stack(&(jacobian * v + self.coupling() * w), &(jacobian * w))
     }
 
     /// The wrench about the top that is equivalent to the generalised force `g`: transposed Jacobian times g.
     ///
-    /// In the axes of the base.
+    /// In the axes of the base. Products of vectors: it is the innermost part of a simulation.
     pub fn wrench(&self, g: &Vector6) -> Vector6 {
         let (force, torque) = split(g);
-        stack(&self.jacobian.tr_mul(&force), &(self.coupling.tr_mul(&force) + self.jacobian.tr_mul(&torque)))
+        let (c, c_slope) = self.series;
+        // A^T f = f + theta x f / 2 + c theta x (theta x f)
+        let transposed = |f: &Vector| {
+            let once = self.theta.cross(f);
+            f + once * 0.5 + self.theta.cross(&once) * c
+        };
+        // W = B A, and B^T f with the derivative B of a by theta.
+        let by_theta = force.cross(&self.position) * 0.5
+            + (self.turned.0.cross(&force) - self.position.cross(&self.theta.cross(&force))) * c
+            + self.theta * (c_slope * self.turned.1.dot(&force));
+        stack(&transposed(&force), &transposed(&(by_theta + torque)))
     }
 
     /// The Jacobian of the coordinates by the twist of the top.
     pub fn rate_matrix(&self) -> Matrix6 {
-        blocks(&self.jacobian, &self.coupling, &Matrix::zeros(), &self.jacobian)
+        let jacobian = self.jacobian();
+        blocks(&jacobian, &self.coupling(), &Matrix::zeros(), &jacobian)
     }
 }
 
@@ -129,7 +154,7 @@ mod tests {
             let p = Vector::new(0.02, -0.03, 0.11);
             let top = Pose::from_parts(p.into(), Rotation::from_scaled_axis(theta));
             let here = Deformation::of(&top);
-            assert_relative_eq!(left_jacobian(&theta) * here.jacobian, Matrix::identity(), epsilon = 1e-12);
+            assert_relative_eq!(left_jacobian(&theta) * here.jacobian(), Matrix::identity(), epsilon = 1e-12);
             for k in 0..6 {
                 let h = 1e-5;
                 let moved = |h: f64| {
@@ -140,6 +165,9 @@ mod tests {
                 let numeric = (moved(h) - moved(-h)) / (2.0 * h);
                 assert_relative_eq!(numeric, here.rate(&Vector6::ith(k, 1.0)), epsilon = 1e-9);
                 assert_relative_eq!(numeric, here.rate_matrix().column(k).into_owned(), epsilon = 1e-9);
+                // The wrench is the transposed Jacobian times the generalised force.
+                let g = Vector6::new(1.0, -0.4, 2.0, 0.3, -0.7, 0.2);
+                assert_relative_eq!(here.wrench(&g)[k], here.rate(&Vector6::ith(k, 1.0)).dot(&g), epsilon = 1e-12);
             }
         }
     }
