@@ -1,7 +1,7 @@
 //! Spec types of the elements of a linkage.
 
 use super::placement::PlacementSpec;
-use crate::elasticity::SpringSpec;
+use crate::elasticity::{ElasticityError, SpringSpec};
 use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,19 @@ pub enum SpringMassSpec {
     Neglected,
     /// The wire moves with the deflection of the spring's top, and half of the wire's weight acts on the top.
     Included,
+}
+
+impl SpringMassSpec {
+    /// Mass of the wire of `spring` that counts, kg; `None` if it is neglected or unknown.
+    ///
+    /// # Errors
+    /// As [`SpringSpec::design`].
+    pub fn of_wire(self, spring: &SpringSpec) -> Result<Option<f64>, ElasticityError> {
+        match self {
+            Self::Neglected => Ok(None),
+            Self::IfKnown | Self::Included => spring.wire_mass_kg(),
+        }
+    }
 }
 
 /// A cable through a spring, from the centre of the foot to the centre of the top.

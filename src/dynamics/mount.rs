@@ -153,12 +153,7 @@ impl CompliantMount<'_> {
     fn add_spring(&mut self, parameters: &SpringParameters<'_>, source: &Source) -> Result<(), SpecError> {
         let invalid = |error: &dyn std::fmt::Display| SpecError::about(source, "spring", error.to_string());
         let design = parameters.spring.design().map_err(|error| invalid(&error))?;
-        let wire_mass_kg = match parameters.mass {
-            SpringMassSpec::Neglected => None,
-            SpringMassSpec::IfKnown | SpringMassSpec::Included => {
-                parameters.spring.wire_mass_kg().map_err(|error| invalid(&error))?
-            }
-        };
+        let wire_mass_kg = parameters.mass.of_wire(parameters.spring).map_err(|error| invalid(&error))?;
         if parameters.mass == SpringMassSpec::Included && wire_mass_kg.is_none() {
             let message = "the mass of the spring is unknown: use a coil whose material has a density_kg_per_m3, or omit \
                            spring_mass";

@@ -1,6 +1,6 @@
 //! Stress in the wire of a helical spring, and the load on it.
 
-use crate::dynamics::{Body, HeadSpec, HeadState, LinkageSpec, SpringMassSpec};
+use crate::dynamics::{Body, HeadSpec, HeadState, LinkageSpec};
 use crate::elasticity::{Material, SpringSpec};
 use crate::geometry::{Kinematics, Pose, Vector, gravity_in_world};
 use std::f64::consts::{PI, TAU};
@@ -129,16 +129,12 @@ impl SpringMounting {
         let LinkageSpec::Spring { spring, base_from_spring, head_from_spring, spring_mass, .. } = &spec.linkage else {
             return None;
         };
-        let wire_mass_kg = match spring_mass {
-            SpringMassSpec::Neglected => None,
-            SpringMassSpec::IfKnown | SpringMassSpec::Included => spring.wire_mass_kg().ok()?,
-        };
         let end = Pose::translation(0.0, 0.0, spring.end_length_m().ok()?);
         Some(Self {
             base_from_foot: base_from_spring.pose() * end,
             head_from_top: head_from_spring.pose() * end.inverse(),
             body: *body,
-            wire_mass_kg: wire_mass_kg.unwrap_or(0.0),
+            wire_mass_kg: spring_mass.of_wire(spring).ok()?.unwrap_or(0.0),
         })
     }
 
