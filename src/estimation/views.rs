@@ -1,12 +1,14 @@
 //! Fixed views (keyframes): surfels of past segments, fixed in the map, with which the window is matched.
 //!
 //! Segments that left the window become a view if they cover cells that the stored views do not. A window uses the few
-//! views that cover most of its cells. Of about equal ones it uses the oldest, which has drifted least.
+//! views that cover most of its cells. Of about equal ones it uses the oldest, which has drifted least. The poses of a view are
+//! fixed; its patches move with the lidar's calibration, or else an early error of it would last (decision 0030).
 
 use super::matching::{Matcher, SearchTrees};
 use super::spec::ViewSpec;
-use super::surfel::{Patch, PlacedSurfel};
+use super::surfel::{Patch, PlacedSurfel, Sighting};
 use crate::geometry::Vector;
+use crate::measurement::LidarCorrection;
 
 /// Edge length of the cells with which the coverage of views is compared, m.
 const CELL_M: f64 = 1.0;
@@ -18,16 +20,46 @@ const MIN_ADDED_FRACTION: f64 = 0.02;
 /// View number of the given map.
 pub(super) const MAP: u64 = u64::MAX;
 
+/// A patch in the map, and how the lidar saw it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SeenPatch {
+    patch: Patch,
+    sighting: Sighting,
+}
+
 /// A fixed view, or a given map.
+///
+/// The patches of a view move with the correction of the lidar's calibration, which applies to all returns.
 #[derive(Debug)]
 pub(super) struct View {
-    pub(super) patches: Vec<Patch>,
+    patches: Vec<Patch>,
+    /// How the lidar saw the patches; empty for a given map.
+    sightings: Vec<Sighting>,
+    /// The corrections with which patches were placed, each with the number of patches placed up to then.
+    placed_by: Vec<(LidarCorrection, usize)>,
     pub(super) trees: SearchTrees,
     cells: Vec<u64>,
     /// View number, in order of storage.
     pub(super) number: u64,
     /// Reference point of the rotation error: the IMU position when the view was stored, m.
     pub(super) pivot: Vector,
+}
+
+impl From<&PlacedSurfel> for SeenPatch {
+    fn from(placed: &PlacedSurfel) -> Self {
+        Self { patch: placed.patch, sighting: placed.sighting }
+    }
+}
+
+impl View {
+    /// The patch at `index` as the correction `lidar` places it, and how the lidar saw it.
+    pub(super) fn patch(&self, index: u32, lidar: &LidarCorrection) -> (Patch, Option<Sighting>) {
+        let index = index as usize;
+        let patch = self.patches[index];
+        let Some(sighting) = self.sightings.get(index) else { return (patch, None) };
+        let by = self.placed_by.partition_point(|(_, until)| *until <= index);
+        (sighting.recalibrated(&patch, &self.placed_by[by].0, lidar), Some(*sighting))
+    }
 }
 
 /// Change of the stored views.
@@ -45,20 +77,41 @@ pub(super) struct Views {
     spec: ViewSpec,
     max_active: usize,
     stored: Vec<View>,
-    gathering: Vec<Patch>,
+    gathering: Vec<SeenPatch>,
+    /// As [`View::placed_by`].
+    gathered_by: Vec<(LidarCorrection, usize)>,
     gathered_s: f64,
     next: u64,
 }
 
 impl Views {
     pub(super) fn new(spec: &ViewSpec, max_active: usize) -> Self {
-        Self { spec: spec.clone(), max_active, stored: Vec::new(), gathering: Vec::new(), gathered_s: 0.0, next: 0 }
+        Self {
+            spec: spec.clone(),
+            max_active,
+            stored: Vec::new(),
+            gathering: Vec::new(),
+            gathered_by: Vec::new(),
+            gathered_s: 0.0,
+            next: 0,
+        }
     }
 
     /// Adds a given map, with which every window is matched and which is never removed.
     pub(super) fn with_map(mut self, patches: &[Patch], matcher: &Matcher, pivot: Vector) -> Self {
         let (trees, cells) = (matcher.build_trees(patches), cells_of(patches.iter()));
-        self.stored.insert(0, View { patches: patches.to_vec(), trees, cells, number: MAP, pivot });
+        self.stored.insert(
+            0,
+            View {
+                patches: patches.to_vec(),
+                sightings: Vec::new(),
+                placed_by: Vec::new(),
+                trees,
+                cells,
+                number: MAP,
+                pivot,
+            },
+        );
         self
     }
 
@@ -67,10 +120,13 @@ impl Views {
         usize::from(self.stored.first().is_some_and(|view| view.number == MAP))
     }
 
-    /// Adds the patches of a segment of `seconds` that left the window; `pivot` is the IMU position at the end of it, m.
+    /// Adds the patches of a segment of `seconds` that left the window, placed with `lidar`.
+    ///
+    /// `pivot` is the IMU position at the end of the segment, m.
     pub(super) fn add_segment(
         &mut self,
-        patches: &[Patch],
+        patches: &[SeenPatch],
+        lidar: LidarCorrection,
         seconds: f64,
         matcher: &Matcher,
         pivot: Vector,
@@ -79,12 +135,15 @@ impl Views {
             return ViewUpdate::default();
         }
         self.gathering.extend(patches);
+        self.gathered_by.push((lidar, self.gathering.len()));
         self.gathered_s += seconds;
         if self.gathered_s < self.spec.length_s - 1e-9 {
             return ViewUpdate::default();
         }
         self.gathered_s = 0.0;
-        let patches = std::mem::take(&mut self.gathering);
+        let gathered = std::mem::take(&mut self.gathering);
+        let placed_by = std::mem::take(&mut self.gathered_by);
+        let (patches, sightings): (Vec<_>, Vec<_>) = gathered.iter().map(|seen| (seen.patch, seen.sighting)).unzip();
         let cells = cells_of(patches.iter());
         let mut seen = cells.clone();
         for view in &self.stored {
@@ -98,7 +157,7 @@ impl Views {
             if self.stored.len() - self.maps() >= self.spec.max_kept { self.remove_most_redundant() } else { None };
         let (trees, number) = (matcher.build_trees(&patches), self.next);
         self.next += 1;
-        self.stored.push(View { patches, trees, cells, number, pivot });
+        self.stored.push(View { patches, sightings, placed_by, trees, cells, number, pivot });
         ViewUpdate { added: Some(number), removed }
     }
 
@@ -184,4 +243,48 @@ fn common(a: &[u64], b: &[u64]) -> usize {
 /// Removes the cells of a sorted list from another one.
 fn remove(from: &mut Vec<u64>, others: &[u64]) {
     from.retain(|cell| others.binary_search(cell).is_err());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimation::load;
+    use crate::geometry::{Matrix, Rotation};
+
+    /// A wall 3 m ahead of a lidar at the origin, by the calibration, as `lidar` places it.
+    fn wall(lidar: &LidarCorrection) -> SeenPatch {
+        let ray = lidar.apply(&Vector::new(3.0, 0.0, 0.0));
+        let covariance = Matrix::from_diagonal(&Vector::new(1e-4, 0.05, 0.05));
+        let (centre, normal) = (lidar.translation + ray, -ray.normalize());
+        let patch = Patch { centre, normal, points: 50.0, covariance, roughness_variance: 0.0, level: 0 };
+        let sighting = Sighting { beam: ray.normalize(), range_m: ray.norm(), map_from_imu: Matrix::identity() };
+        SeenPatch { patch, sighting }
+    }
+
+    #[test]
+    fn patches_of_a_view_move_with_the_calibration_and_those_of_a_given_map_do_not() {
+        let spec = load("default").unwrap();
+        let matcher = Matcher::new(&spec.matching, &spec.surfels);
+        let lidar = |range_m: f64, turn_rad: f64, shift_m: f64| LidarCorrection {
+            range_m,
+            rotation: Rotation::from_scaled_axis(Vector::new(0.1, -0.3, 1.0) * turn_rad),
+            translation: Vector::new(0.5, 1.0, -0.2) * shift_m,
+        };
+        let map = wall(&LidarCorrection::default()).patch;
+        let mut views = Views::new(&spec.views, 5).with_map(&[map], &matcher, Vector::zeros());
+        // Two segments of one view, placed with different corrections.
+        for by in [lidar(0.004, 0.0, 0.0), lidar(-0.002, 1e-3, 2e-3)] {
+            views.add_segment(&[wall(&by)], by, 0.5 * spec.views.length_s, &matcher, Vector::zeros());
+        }
+        let now = lidar(0.007, -2e-3, 1e-3);
+        let expected = wall(&now).patch;
+        for index in [0, 1] {
+            let (patch, sighting) = views.view(1).patch(index, &now);
+            assert!(sighting.is_some());
+            // Terms of second order: 3 mrad times 9 mm, and half of 3 mrad squared times 3 m.
+            assert!((patch.centre - expected.centre).norm() < 5e-5, "{patch:?}");
+            assert!((patch.normal - expected.normal).norm() < 1e-5, "{patch:?}");
+        }
+        assert_eq!(views.view(0).patch(0, &now), (map, None));
+    }
 }

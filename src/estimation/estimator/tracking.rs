@@ -80,7 +80,7 @@ impl Estimator {
         }
         self.gauge.advance(&mut local_map.consider, until_s, self.intake.stamp(tau_s));
         let patches = window.remove_oldest(linearised)?;
-        local_map.add_segment(&patches, self.spec.step_s, window.matcher());
+        local_map.add_segment(&patches, window.lidar(), self.spec.step_s, window.matcher());
         Some(until_s)
     }
 

@@ -3,14 +3,16 @@
 //! `e = n^T (mu_i - mu_j)`, with `n, lambda` the least eigenpair of `S_i + S_j`, weighted by `zeta^2 = 1 / (sigma_r^2 +
 //! lambda + d_i + d_j)`, with `d` the extra variance of a patch that is not flat. The centre of a live surfel moves by
 //! `dt + dr x arm + v dl + u dr + R (e x R^T l + s)`, with `l` the vector from the lidar, `u` its direction, and the
-//! lidar rotated by `e` and translated by `s` along the IMU axes. A surfel of a fixed view does not move.
+//! lidar rotated by `e` and translated by `s` along the IMU axes. A surfel of a fixed view moves with the calibration
+//! of the lidar only.
 //!
 //! The unknowns common to all surfels are in the border. `B` of them are used: [`COMMON`], or only the first
 //! [`COMMON_WITHOUT_EXTRINSICS`] if the lidar extrinsics are not estimated.
 
 use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout};
-use crate::estimation::surfel::{Patch, PlacedSurfel};
+use crate::estimation::spline::Basis;
+use crate::estimation::surfel::{Patch, PlacedSurfel, Sighting};
 use crate::geometry::{Matrix, Vector};
 
 /// The common plane of two matched surfels.
@@ -64,6 +66,8 @@ pub(in crate::estimation) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
 
 /// Common unknowns without extrinsics: clock offset, clock rate and range bias.
 pub(in crate::estimation) const COMMON_WITHOUT_EXTRINSICS: usize = 3;
+/// Index of the range bias in them.
+const RANGE_BIAS: usize = 2;
 /// Common unknowns with extrinsics: also rotation and translation of the lidar.
 pub(in crate::estimation) const COMMON: usize = 9;
 
@@ -86,15 +90,23 @@ impl<const B: usize> SurfelJacobian<B> {
         common[..COMMON_WITHOUT_EXTRINSICS].copy_from_slice(&[
             later,
             later * (surfel.tau_s - clock_reference_s),
-            normal.dot(&surfel.beam),
+            normal.dot(&surfel.sighting.beam),
         ]);
         if B == COMMON {
-            let lidar_rotation = surfel.map_from_imu.tr_mul(&surfel.ray().cross(normal));
-            let lidar_translation = surfel.map_from_imu.tr_mul(normal);
-            common[COMMON_WITHOUT_EXTRINSICS..COMMON_WITHOUT_EXTRINSICS + 3].copy_from_slice(lidar_rotation.as_slice());
-            common[COMMON_WITHOUT_EXTRINSICS + 3..].copy_from_slice(lidar_translation.as_slice());
+            common[COMMON_WITHOUT_EXTRINSICS..].copy_from_slice(&surfel.sighting.by_extrinsics(normal));
         }
         Self { own: [rotation.x, rotation.y, rotation.z, normal.x, normal.y, normal.z], common }
+    }
+
+    /// Adds the derivatives of a patch of a fixed view, seen as in `sighting`, by the calibration of the lidar.
+    #[inline(always)]
+    pub(in crate::estimation) fn against_fixed(mut self, normal: &Vector, sighting: &Sighting) -> Self {
+        self.common[RANGE_BIAS] -= normal.dot(&sighting.beam);
+        if B == COMMON {
+            let extrinsics = sighting.by_extrinsics(normal);
+            self.common[COMMON_WITHOUT_EXTRINSICS..].iter_mut().zip(extrinsics).for_each(|(sum, by)| *sum -= by);
+        }
+        self
     }
 
     /// Adds the other surfel's derivatives by the common unknowns.
@@ -105,18 +117,15 @@ impl<const B: usize> SurfelJacobian<B> {
     }
 }
 
-/// Adds the Jacobian row of a match of `surfel`, scaled by `scales[k]`, to column `k` of six.
+/// Adds the Jacobian row of a match with derivatives `side` of a surfel with `basis`, scaled by `scales[k]`, to column `k` of six.
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
-    surfel: &PlacedSurfel,
-    normal: &Vector,
+    side: &SurfelJacobian<COMMON>,
+    basis: &Basis,
     scales: &[f64; 6],
-    clock_reference_s: f64,
 ) {
-    let side = SurfelJacobian::<COMMON>::of(surfel, normal, clock_reference_s);
-    let (first, common, knots) =
-        (layout.knot(surfel.basis.first), layout.border() + CLOCK, over_knots(&side.own, &surfel.basis));
+    let (first, common, knots) = (layout.knot(basis.first), layout.border() + CLOCK, over_knots(&side.own, basis));
     for (column, scale) in columns.iter_mut().zip(scales) {
         add_scaled(&mut column[first..first + SPAN_UNKNOWNS], &knots, *scale);
         add_scaled(&mut column[common..common + COMMON], &side.common, *scale);
@@ -133,7 +142,7 @@ mod tests {
     use crate::estimation::spline::Basis;
     use crate::geometry::{Rotation, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::{DMatrix, DVector, DVectorView};
 
     const AT_S: f64 = 0.5;
 
@@ -154,9 +163,11 @@ mod tests {
             tau_s,
             arm: Vector::new(1.5, 0.2 * seed, -0.4),
             velocity: Vector::new(3.0, -2.0 * seed, 1.0),
-            beam: Vector::new(0.8, 0.1 * seed, -0.3).normalize(),
-            range_m: 2.5,
-            map_from_imu: turn.transpose(),
+            sighting: Sighting {
+                beam: Vector::new(0.8, 0.1 * seed, -0.3).normalize(),
+                range_m: 2.5,
+                map_from_imu: turn.transpose(),
+            },
             basis: Basis::at(tau_s + 0.003, 0.2),
         }
     }
@@ -169,19 +180,26 @@ mod tests {
         let origin = surfel.patch.centre - surfel.arm;
         let turned = Rotation::from_scaled_axis(correction.rotation) * surfel.arm;
         let border = x.rows(layout.border(), BORDER);
-        let lidar_turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_ROTATION).into_owned());
-        let reach_in_imu = surfel.map_from_imu.transpose() * surfel.beam * surfel.range_m;
-        let moved_in_imu = lidar_turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_TRANSLATION);
-        let by_lidar = surfel.map_from_imu * moved_in_imu + surfel.beam * border[RANGE];
-        origin + correction.translation + turned + surfel.velocity * later_s + by_lidar
+        origin + correction.translation + turned + surfel.velocity * later_s + moved_by_lidar(surfel, &border)
+    }
+
+    /// The motion of the centre by a step `border`, by the definition of the calibration.
+    fn moved_by_lidar(surfel: &PlacedSurfel, border: &DVectorView<f64>) -> Vector {
+        let Sighting { beam, range_m, map_from_imu } = surfel.sighting;
+        let turn = Rotation::from_scaled_axis(border.fixed_rows::<3>(LIDAR_ROTATION).into_owned());
+        let reach_in_imu = map_from_imu.transpose() * beam * range_m;
+        let moved_in_imu = turn * reach_in_imu - reach_in_imu + border.fixed_rows::<3>(LIDAR_TRANSLATION);
+        map_from_imu * moved_in_imu + beam * border[RANGE]
     }
 
     fn check(a: &PlacedSurfel, b: Option<&PlacedSurfel>) {
         let layout = Layout { first_knot: 0, knots: 12 };
-        let other = b.map_or(surfel(0.0, 0.5).patch, |b| b.patch);
+        let fixed = surfel(0.0, 0.5);
+        let other = b.map_or(fixed.patch, |b| b.patch);
         let plane = Plane::of(&a.patch, &other, 0.01);
         let distance = |x: &DVector<f64>| {
-            let there = b.map_or(other.centre, |b| moved(b, &layout, x));
+            let of_view = other.centre + moved_by_lidar(&fixed, &x.rows(layout.border(), BORDER));
+            let there = b.map_or(of_view, |b| moved(b, &layout, x));
             plane.normal.dot(&(moved(a, &layout, x) - there))
         };
         let jacobian = DMatrix::from_fn(1, layout.size(), |_, k| {
@@ -191,7 +209,8 @@ mod tests {
         let mut equations = NormalEquations::new(layout.size());
         let one = SurfelJacobian::<COMMON>::of(a, &plane.normal, AT_S);
         let other = b.map(|b| (b, SurfelJacobian::of(b, &-plane.normal, AT_S)));
-        let both = other.as_ref().map_or(one, |(_, other)| one.together_with(other));
+        let with_view = one.against_fixed(&plane.normal, &fixed.sighting);
+        let both = other.as_ref().map_or(with_view, |(_, other)| one.together_with(other));
         for (surfel, side) in [(a, both)].into_iter().chain(other.map(|(b, side)| (b, side.together_with(&one)))) {
             let (mut own, mut of_span) = (SurfelSums::NONE, SpanSums::NONE);
             own.add(&side, plane.distance_m, 3.0);

@@ -6,6 +6,7 @@ use super::super::spline::Basis;
 use super::super::unknowns::Unknowns;
 use crate::geometry::Matrix;
 use crate::geometry::Vector;
+use crate::measurement::LidarCorrection;
 
 /// Resolution of half the finest voxel, of which surfels are built where the geometry is weak; the others are 0 to 5.
 pub(in crate::estimation) const FINE: usize = 6;
@@ -51,6 +52,17 @@ pub(in crate::estimation) struct Surfel {
     pub(in crate::estimation) level: usize,
 }
 
+/// How the lidar saw a patch, and so how the patch moves with the lidar's calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::estimation) struct Sighting {
+    /// Unit vector from the lidar to the centre, in map axes.
+    pub(in crate::estimation) beam: Vector,
+    /// Distance from the lidar to the centre, m.
+    pub(in crate::estimation) range_m: f64,
+    /// Attitude of the IMU at that time.
+    pub(in crate::estimation) map_from_imu: Matrix,
+}
+
 /// A planar patch of surface in the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::estimation) struct Patch {
@@ -77,12 +89,8 @@ pub(in crate::estimation) struct PlacedSurfel {
     pub(in crate::estimation) tau_s: f64,
     /// Vector from the IMU to the centre, in map axes, m.
     pub(in crate::estimation) arm: Vector,
-    /// Unit vector from the lidar to the centre, in map axes.
-    pub(in crate::estimation) beam: Vector,
-    /// Distance from the lidar to the centre, m.
-    pub(in crate::estimation) range_m: f64,
-    /// Attitude of the IMU at that time.
-    pub(in crate::estimation) map_from_imu: Matrix,
+    /// How the lidar saw it.
+    pub(in crate::estimation) sighting: Sighting,
     /// Derivative of the centre by the clock offset, m/s; zero if the trajectory is in lidar time.
     pub(in crate::estimation) velocity: Vector,
     /// The correction spline's basis at that time.
@@ -101,10 +109,35 @@ impl Patch {
     }
 }
 
-impl PlacedSurfel {
+impl Sighting {
     /// Vector from the lidar to the centre, in map axes, m.
-    pub(in crate::estimation) fn ray(&self) -> Vector {
+    fn ray(&self) -> Vector {
         self.beam * self.range_m
+    }
+
+    /// Derivatives of the position along `normal` by rotation and translation of the lidar, IMU axes.
+    #[inline(always)]
+    pub(in crate::estimation) fn by_extrinsics(&self, normal: &Vector) -> [f64; 6] {
+        let rotation = self.map_from_imu.tr_mul(&self.ray().cross(normal));
+        let translation = self.map_from_imu.tr_mul(normal);
+        [rotation.x, rotation.y, rotation.z, translation.x, translation.y, translation.z]
+    }
+
+    /// The patch that was placed with the correction `from`, placed with `to`; both are small.
+    pub(in crate::estimation) fn recalibrated(
+        &self,
+        patch: &Patch,
+        from: &LidarCorrection,
+        to: &LidarCorrection,
+    ) -> Patch {
+        let longer = self.beam * (to.range_m - from.range_m);
+        if (from.rotation, from.translation) == (to.rotation, to.translation) {
+            return Patch { centre: patch.centre + longer, ..*patch };
+        }
+        let turn = self.map_from_imu * (to.rotation * from.rotation.inverse()).scaled_axis();
+        let shift = self.map_from_imu * (to.translation - from.translation) + turn.cross(&self.ray());
+        let normal = (patch.normal + turn.cross(&patch.normal)).normalize();
+        Patch { centre: patch.centre + longer + shift, normal, ..*patch }
     }
 }
 
@@ -144,9 +177,7 @@ impl Surfel {
             patch,
             tau_s: self.tau_s,
             arm,
-            beam: motion.rotation * ray_in_imu / range_m,
-            range_m,
-            map_from_imu: motion.rotation,
+            sighting: Sighting { beam: motion.rotation * ray_in_imu / range_m, range_m, map_from_imu: motion.rotation },
             velocity,
             basis: Basis::at(u_s, by.knot_spacing_s),
         }

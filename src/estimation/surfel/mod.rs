@@ -10,4 +10,4 @@ mod flatness;
 mod moments;
 
 pub(super) use build::{Detail, SurfelBuilder};
-pub(super) use element::{FINE, Patch, PlacedSurfel, PlacementState, Surfel, TimedReturn, voxel_edge_m};
+pub(super) use element::{FINE, Patch, PlacedSurfel, PlacementState, Sighting, Surfel, TimedReturn, voxel_edge_m};

@@ -2,7 +2,7 @@
 
 use crate::estimation::matching::Matcher;
 use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::{Patch, PlacedSurfel};
+use crate::estimation::surfel::{Patch, PlacedSurfel, Sighting};
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use rayon::prelude::*;
@@ -49,8 +49,8 @@ pub(super) struct Match {
 pub(super) enum Counterpart {
     /// Another surfel of the window: an index into the scene.
     Live(u32),
-    /// A patch of a fixed view.
-    Fixed { view: u32, patch: u32 },
+    /// A patch of a fixed view; without `sighting`, it does not depend on the lidar's calibration.
+    Fixed { view: u32, patch: u32, sighting: Option<Sighting> },
 }
 
 /// The matches of an iteration.

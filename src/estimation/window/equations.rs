@@ -1,6 +1,6 @@
 //! Parts of the window's normal equations: buffers, the robust kernel, and the matches with robust weights.
 
-use super::correspondence::{Match, Matches};
+use super::correspondence::{Counterpart, Match, Matches};
 use crate::estimation::normal_equations::{Factor, NormalEquations};
 use crate::estimation::residual::Layout;
 use crate::estimation::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
@@ -36,7 +36,7 @@ pub(super) struct Robust {
 impl Robust {
     /// The kernel of an iteration: the threshold shrinks from `cauchy_start` to `cauchy_end`.
     pub fn of(spec: &SolveSpec, iteration: usize) -> Self {
-        let late = iteration as f64 / (spec.max_iterations as f64 - 1.0).max(1.0);
+        let late = (iteration as f64 / (spec.max_iterations as f64 - 1.0).max(1.0)).min(1.0);
         let threshold = spec.cauchy_start + (spec.cauchy_end - spec.cauchy_start) * late;
         Self { weight: spec.match_weight, threshold }
     }
@@ -154,6 +154,10 @@ impl WeightedMatches<'_> {
     fn side<const B: usize>(&self, one: &Match, first: bool) -> SurfelJacobian<B> {
         let normal = if first { one.plane.normal } else { -one.plane.normal };
         let surfel = if first { one.a as usize } else { one.other().unwrap_or(one.a as usize) };
-        SurfelJacobian::of(&self.scene[surfel], &normal, self.clock_reference_s)
+        let side = SurfelJacobian::of(&self.scene[surfel], &normal, self.clock_reference_s);
+        match &one.with {
+            Counterpart::Fixed { sighting: Some(sighting), .. } => side.against_fixed(&normal, sighting),
+            Counterpart::Fixed { sighting: None, .. } | Counterpart::Live(_) => side,
+        }
     }
 }

@@ -31,6 +31,7 @@ use super::strapdown::Interval;
 use super::surfel::{Detail, FINE, Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
+use super::views::SeenPatch;
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
@@ -169,6 +170,11 @@ impl Window {
     /// All patches of the window, in the map frame.
     pub(super) fn patches(&self) -> Vec<Patch> {
         self.scene().into_iter().map(|placed| placed.patch).collect()
+    }
+
+    /// The same, each with the way in which the lidar saw it.
+    pub(super) fn seen_patches(&self) -> Vec<SeenPatch> {
+        self.scene().iter().map(SeenPatch::from).collect()
     }
 
     /// Moves the window to the pose from relocalisation; from then on the map constrains it.
@@ -374,10 +380,10 @@ impl Window {
     }
 
     /// Removes the oldest segment, whose states become final; returns the patches of that segment in the map frame.
-    pub(super) fn remove_oldest(&mut self, linearised: Option<&Linearised>) -> Option<Vec<Patch>> {
+    pub(super) fn remove_oldest(&mut self, linearised: Option<&Linearised>) -> Option<Vec<SeenPatch>> {
         let start_s = self.next_start_s()?;
         let oldest = self.segments.pop_front()?;
-        let placed = oldest.surfels.iter().map(|surfel| surfel.place(&self.placing()).patch).collect();
+        let placed = oldest.surfels.iter().map(|surfel| SeenPatch::from(&surfel.place(&self.placing()))).collect();
         let by_lidar = linearised.and_then(|at| self.regression_on_lidar(start_s, at));
         self.start = Start { by_lidar, ..Start::continuing(start_s) };
         self.rests.forget_before(start_s);

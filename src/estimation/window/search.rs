@@ -57,8 +57,9 @@ impl Window {
             Some(Match { a: *a, with: Counterpart::Live(*b), plane })
         };
         let fixed = |(a, view, patch): &(u32, u32, u32)| {
-            let plane = plane(*a, &views.view(*view as usize).patches[*patch as usize])?;
-            Some(Match { a: *a, with: Counterpart::Fixed { view: *view, patch: *patch }, plane })
+            let (other, sighting) = views.view(*view as usize).patch(*patch, &self.unknowns.lidar);
+            let plane = plane(*a, &other)?;
+            Some(Match { a: *a, with: Counterpart::Fixed { view: *view, patch: *patch, sighting }, plane })
         };
         let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
         all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
@@ -77,8 +78,10 @@ impl Window {
     ) {
         for Match { a, with, plane } in &mut matches.all {
             let other = match *with {
-                Counterpart::Live(b) => &scene[b as usize].patch,
-                Counterpart::Fixed { view, patch } => &views.view(view as usize).patches[patch as usize],
+                Counterpart::Live(b) => scene[b as usize].patch,
+                Counterpart::Fixed { view, patch, .. } => {
+                    views.view(view as usize).patch(patch, &self.unknowns.lidar).0
+                }
             };
             let variance =
                 scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);

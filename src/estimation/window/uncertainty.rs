@@ -4,8 +4,9 @@ use super::Window;
 use super::correspondence::{Counterpart, Match};
 use super::linearised::Linearised;
 use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
+use crate::estimation::residual::matched::{self, SurfelJacobian};
 use crate::estimation::residual::prior::ByLidar;
-use crate::estimation::residual::{LIDAR_ROTATION, Layout, matched};
+use crate::estimation::residual::{LIDAR_ROTATION, Layout};
 use crate::estimation::spline::Basis;
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
@@ -112,7 +113,7 @@ impl Window {
     fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<(u64, [Vec<f64>; 6])> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
         for Match { a, with, plane } in &at.matches.all {
-            let Counterpart::Fixed { view: index, .. } = *with else { continue };
+            let Counterpart::Fixed { view: index, sighting, .. } = *with else { continue };
             let found = columns.iter().position(|(other, _)| *other == index);
             let index_in_columns = found.unwrap_or_else(|| {
                 columns.push((index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));
@@ -124,14 +125,9 @@ impl Window {
             let turn: Vector = lever.cross(&plane.normal) * weight;
             let shift = plane.normal * weight;
             let by = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-            matched::add_scaled_row(
-                &mut columns[index_in_columns].1,
-                &at.layout,
-                surfel,
-                &plane.normal,
-                &by,
-                self.unknowns.clock.at_s,
-            );
+            let side = SurfelJacobian::of(surfel, &plane.normal, self.unknowns.clock.at_s);
+            let side = sighting.map_or(side, |sighting| side.against_fixed(&plane.normal, &sighting));
+            matched::add_scaled_row(&mut columns[index_in_columns].1, &at.layout, &side, &surfel.basis, &by);
         }
         columns.into_iter().map(|(index, columns)| (views.view(index as usize).number, columns)).collect()
     }
