@@ -51,7 +51,7 @@ pub struct WindowReport {
     pub residual_rms_m: f64,
     /// Number of iterations: match, then solve.
     pub iterations: usize,
-    /// Largest correction in the last iteration, m or rad.
+    /// Largest correction in the last iteration of the usual number, m or rad.
     pub last_correction_m: f64,
     /// Smallest over largest eigenvalue of the position information of the matches, 0..1; 0 without matches.
     pub conditioning: f64,

@@ -14,6 +14,11 @@ use crate::geometry::{Matrix, Vector};
 
 /// A correction above this (m, rad) in one iteration is rejected.
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
+/// A window with a larger correction than this in its last iteration is solved further, m or rad: after a shock, matches change
+/// until the window has converged.
+const FAR_FROM_SETTLED: f64 = 0.005;
+/// The most iterations then, as a multiple of the usual number.
+const MOST_ITERATIONS: usize = 4;
 /// Lever arm that converts a rotation of the head into surfel motion, m; more distant surfaces are in larger cells.
 const LEVER_ARM_M: f64 = 5.0;
 /// Conditioning below which a just relocalised window is not corrected along the weakest direction. Only a few matches
@@ -29,6 +34,7 @@ pub(in crate::estimation) struct WindowSolution {
     pub views: usize,
     pub residual_rms_m: f64,
     pub iterations: usize,
+    /// Correction in the last iteration of the usual number: evidence of several solutions.
     pub last_correction_m: f64,
     pub conditioning: f64,
     /// The least constrained direction, in the map frame.
@@ -54,7 +60,8 @@ impl Window {
         let mut chosen = None;
         let mut linearised = None;
         let mut watch = Stopwatch::start();
-        for iteration in 0..self.spec.solve.max_iterations {
+        let usual = self.spec.solve.max_iterations;
+        for iteration in 0..MOST_ITERATIONS * usual {
             let scene = self.scene();
             solved.timing.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.select(&scene));
@@ -85,9 +92,12 @@ impl Window {
             self.sees_rest |= !at.matches.all.is_empty();
             neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
             solved.timing.correction_s += watch.lap_s();
-            solved.last_correction_m = by.max();
+            if iteration < usual {
+                solved.last_correction_m = by.max();
+            }
             linearised = Some(Linearised { step: x, ..at });
-            if solved.last_correction_m < self.spec.solve.settled_m {
+            let enough = if iteration + 1 < usual { self.spec.solve.settled_m } else { FAR_FROM_SETTLED };
+            if by.max() < enough {
                 break;
             }
         }
