@@ -60,8 +60,7 @@ impl Window {
         let mut chosen = None;
         let mut linearised = None;
         let mut watch = Stopwatch::start();
-        let usual = self.spec.solve.max_iterations;
-        for iteration in 0..MOST_ITERATIONS * usual {
+        for iteration in 0..MOST_ITERATIONS * self.spec.solve.max_iterations {
             let scene = self.scene();
             solved.timing.placing_s += watch.lap_s();
             let chosen = chosen.get_or_insert_with(|| views.select(&scene));
@@ -92,12 +91,8 @@ impl Window {
             self.sees_rest |= !at.matches.all.is_empty();
             neighbours.moved(by.translation_m + LEVER_ARM_M * by.rotation_rad);
             solved.timing.correction_s += watch.lap_s();
-            if iteration < usual {
-                solved.last_correction_m = by.max();
-            }
             linearised = Some(Linearised { step: x, ..at });
-            let enough = if iteration + 1 < usual { self.spec.solve.settled_m } else { FAR_FROM_SETTLED };
-            if by.max() < enough {
+            if self.has_settled(&mut solved, by.max()) {
                 break;
             }
         }
@@ -108,6 +103,15 @@ impl Window {
         }
         self.choose_detail(&solved);
         (solved, linearised)
+    }
+
+    /// Records the correction of an iteration, m or rad; whether it is the last one.
+    fn has_settled(&self, solved: &mut WindowSolution, correction: f64) -> bool {
+        let usual = self.spec.solve.max_iterations;
+        if solved.iterations <= usual {
+            solved.last_correction_m = correction;
+        }
+        correction < if solved.iterations < usual { self.spec.solve.settled_m } else { FAR_FROM_SETTLED }
     }
 
     /// Builds fine surfels for the next window's time if the geometry of this one is weak.
