@@ -1,5 +1,6 @@
 //! Studies: coverage, gains, latency, spring design, sweeps, and the paper's experiments.
 
+mod bounds;
 mod coverage;
 mod gains;
 mod kubernetes;
