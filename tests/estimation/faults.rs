@@ -234,21 +234,34 @@ fn gaps_and_frozen_sensors_are_reported() {
 /// The first two cases were lost before the sensor was judged again after a gap, the third before relocalisation counted the
 /// large surfels too.
 #[test]
-fn a_gap_is_survived_at_the_start_and_outdoors() {
+fn a_gap_is_survived_at_the_start() {
     let early = |thin| {
         format!("(sensor: imu, from_s: 0.3, to_s: 4, fault: gap), (sensor: imu, fault: thin({thin}, repeat_s: 57.2))")
     };
     let micro_controller = early("file: \"FAULTS/imu_arrivals_mcu.txt\"");
     let merged = early("file: \"FAULTS/imu_arrivals_mcu_merged.txt\"");
-    let outdoors = "(sensor: imu, from_s: 10, to_s: 10.6, fault: gap)";
     for (name, faults, scene, stated, within) in [
         ("irregular", &micro_controller[..], "office", &["started_in_motion", "imu_gap"][..], (0.012, 0.5)),
         ("irregular, merged", &merged, "office", &["started_in_motion", "imu_gap"], (0.012, 0.5)),
-        // Of five seeds, 4 to 28 mm.
-        ("outdoors", outdoors, "courtyard", &["relocalised"], (0.03, 2.0)),
     ] {
         check(&Case { name, faults, scene, duration_s: 20, code: 3, within: Some(within), stated, ..CASE });
     }
+}
+
+/// The phase of the swing in the gap changes the error tenfold: 3 to 52 mm in seven runs.
+#[test]
+fn a_gap_outdoors_is_survived() {
+    let faults = "(sensor: imu, from_s: 10, to_s: 10.6, fault: gap)";
+    let error_m = |seed| {
+        let case = Case { name: "outdoors", faults, scene: "courtyard", duration_s: 20, seed, ..CASE };
+        let (code, figures, stderr, _) = full_run(&case);
+        let metrics: Value = serde_json::from_str(&figures).unwrap();
+        assert!(code == 3 && stated(&metrics).contains(&"relocalised"), "{seed}: {stderr}");
+        errors(&metrics).0
+    };
+    let mut errors_m: Vec<f64> = (1..6).map(error_m).collect();
+    errors_m.sort_by(f64::total_cmp);
+    assert!(errors_m[2] < 0.02 && errors_m[4] < 0.15, "{errors_m:?}");
 }
 
 /// The window after the gap contains a further gap. It converged to a wrong motion, and the run was lost by 1.4 m.
@@ -259,10 +272,10 @@ fn an_inconsistent_window_after_a_gap_starts_later() {
         faults: "(sensor: imu, fault: thin(file: \"FAULTS/imu_arrivals_mcu.txt\", repeat_s: 57.2))",
         scene: "tall_grass",
         duration_s: 20,
-        seed: 6,
+        seed: 12,
         code: 3,
-        // The estimate starts anew with little data, and a rounding error decides between 0.02 and 0.2 m; the verdict is lost.
-        within: Some((0.3, 3.0)),
+        // The estimate starts anew with little data; the verdict is lost.
+        within: Some((0.2, 1.2)),
         stated: &["start_rejected", "relocalised"],
         ..CASE
     });

@@ -14,8 +14,8 @@ use crate::geometry::{Matrix, Vector};
 
 /// A correction above this (m, rad) in one iteration is rejected.
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
-/// A window with a larger correction than this in its last iteration is solved further, m or rad: after a shock, matches change
-/// until the window has converged.
+/// A window that matches widely, as after a shock, is solved further if its last correction is larger than this, m or rad: the
+/// matches change until it has converged.
 const FAR_FROM_SETTLED: f64 = 0.005;
 /// The most iterations then, as a multiple of the usual number.
 const MOST_ITERATIONS: usize = 4;
@@ -111,7 +111,8 @@ impl Window {
         if solved.iterations <= usual {
             solved.last_correction_m = correction;
         }
-        correction < if solved.iterations < usual { self.spec.solve.settled_m } else { FAR_FROM_SETTLED }
+        let goes_on = self.matches_widely() && correction >= FAR_FROM_SETTLED;
+        correction < self.spec.solve.settled_m || solved.iterations >= usual && !goes_on
     }
 
     /// Builds fine surfels for the next window's time if the geometry of this one is weak.
