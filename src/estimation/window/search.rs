@@ -26,11 +26,6 @@ impl Window {
             .collect()
     }
 
-    /// Whether the window started in motion, or contains a bridged gap or a shock: its corrections are large.
-    pub(super) fn matches_widely(&self) -> bool {
-        self.wide_matching || self.bridged_gap
-    }
-
     /// For each surfel of the scene: the segment, and the index into the surfels of that segment.
     fn surfel_indices(&self) -> Vec<(usize, usize)> {
         let (from, to) = (self.start.u_s, self.nominal.end_s());
@@ -50,7 +45,7 @@ impl Window {
         neighbours: &Neighbours,
         iteration: usize,
     ) -> Matches {
-        let widening = if self.matches_widely() { WIDE_GATE } else { 1.0 };
+        let widening = if self.wide_matching || self.bridged_gap { WIDE_GATE } else { 1.0 };
         let gate_m = widening * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
         let plane = |a: u32, other: &Patch| {

@@ -14,8 +14,8 @@ use crate::geometry::{Matrix, Vector};
 
 /// A correction above this (m, rad) in one iteration is rejected.
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
-/// A window that matches widely, as after a shock, is solved further if its last correction is larger than this, m or rad: the
-/// matches change until it has converged.
+/// A window with a shock or a bridged gap is solved further if its last correction is larger than this, m or rad: the matches
+/// change until it has converged.
 const FAR_FROM_SETTLED: f64 = 0.005;
 /// The most iterations then, as a multiple of the usual number.
 const MOST_ITERATIONS: usize = 4;
@@ -111,7 +111,7 @@ impl Window {
         if solved.iterations <= usual {
             solved.last_correction_m = correction;
         }
-        let goes_on = self.matches_widely() && correction >= FAR_FROM_SETTLED;
+        let goes_on = self.bridged_gap && correction >= FAR_FROM_SETTLED;
         correction < self.spec.solve.settled_m || solved.iterations >= usual && !goes_on
     }
 
