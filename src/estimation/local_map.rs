@@ -3,8 +3,7 @@
 use super::consider::ConsiderCovariance;
 use super::matching::Matcher;
 use super::spec::EstimatorSpec;
-use super::views::{SeenPatch, Views};
-use crate::measurement::LidarCorrection;
+use super::views::{SeenSegment, Views};
 
 /// The surfaces with which windows are matched, and the errors of these surfaces and of the window start.
 #[derive(Debug)]
@@ -20,15 +19,9 @@ impl LocalMap {
         Self { views: Views::new(&spec.views, spec.fixed_views), consider }
     }
 
-    /// Adds the patches of a segment of `seconds` that ends at the window start, placed with `lidar`.
-    pub(super) fn add_segment(
-        &mut self,
-        patches: &[SeenPatch],
-        lidar: LidarCorrection,
-        seconds: f64,
-        matcher: &Matcher,
-    ) {
-        let update = self.views.add_segment(patches, lidar, seconds, matcher, self.consider.pivot());
+    /// Adds a segment that ends at the window start.
+    pub(super) fn add_segment(&mut self, segment: &SeenSegment, matcher: &Matcher) {
+        let update = self.views.add_segment(segment, matcher, self.consider.pivot());
         self.consider.update_views(update);
     }
 }

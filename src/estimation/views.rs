@@ -45,6 +45,16 @@ pub(super) struct View {
     pub(super) pivot: Vector,
 }
 
+/// The patches of a part of the trajectory.
+#[derive(Debug)]
+pub(super) struct SeenSegment {
+    pub(super) patches: Vec<SeenPatch>,
+    /// The correction with which they were placed.
+    pub(super) lidar: LidarCorrection,
+    /// Duration, s.
+    pub(super) seconds: f64,
+}
+
 impl From<&PlacedSurfel> for SeenPatch {
     fn from(placed: &PlacedSurfel) -> Self {
         Self { patch: placed.patch, sighting: placed.sighting }
@@ -120,23 +130,14 @@ impl Views {
         usize::from(self.stored.first().is_some_and(|view| view.number == MAP))
     }
 
-    /// Adds the patches of a segment of `seconds` that left the window, placed with `lidar`.
-    ///
-    /// `pivot` is the IMU position at the end of the segment, m.
-    pub(super) fn add_segment(
-        &mut self,
-        patches: &[SeenPatch],
-        lidar: LidarCorrection,
-        seconds: f64,
-        matcher: &Matcher,
-        pivot: Vector,
-    ) -> ViewUpdate {
+    /// Adds a segment that left the window; `pivot` is the IMU position at the end of it, m.
+    pub(super) fn add_segment(&mut self, segment: &SeenSegment, matcher: &Matcher, pivot: Vector) -> ViewUpdate {
         if self.max_active == 0 {
             return ViewUpdate::default();
         }
-        self.gathering.extend(patches);
-        self.gathered_by.push((lidar, self.gathering.len()));
-        self.gathered_s += seconds;
+        self.gathering.extend(&segment.patches);
+        self.gathered_by.push((segment.lidar, self.gathering.len()));
+        self.gathered_s += segment.seconds;
         if self.gathered_s < self.spec.length_s - 1e-9 {
             return ViewUpdate::default();
         }
@@ -274,7 +275,8 @@ mod tests {
         let mut views = Views::new(&spec.views, 5).with_map(&[map], &matcher, Vector::zeros());
         // Two segments of one view, placed with different corrections.
         for by in [lidar(0.004, 0.0, 0.0), lidar(-0.002, 1e-3, 2e-3)] {
-            views.add_segment(&[wall(&by)], by, 0.5 * spec.views.length_s, &matcher, Vector::zeros());
+            let segment = SeenSegment { patches: vec![wall(&by)], lidar: by, seconds: 0.5 * spec.views.length_s };
+            views.add_segment(&segment, &matcher, Vector::zeros());
         }
         let now = lidar(0.007, -2e-3, 1e-3);
         let expected = wall(&now).patch;

@@ -20,9 +20,9 @@ const MIN_BOUND_M: f64 = 0.001;
 /// Ratio of the error after alignment to the error that the covariance predicts, in runs without findings.
 ///
 /// The covariance treats the matches of a surface as independent, with a standard deviation of 10 mm each; the alignment
-/// removes their common error. With 0.55, at least 99 % of the poses are within the bound in 26 of 28 runs in seven scenes and
-/// motions; with 0.47 in 25, with 0.36 in 17, with 0.7 in all. Runs shorter than 40 s have a shorter alignment, which removes less: the ratio grows
-/// with the inverse square root of its duration, up to 1.
+/// removes their common error. With 0.55, at least 99 % of the poses are within the bound in 26 of 28 runs in seven scenes
+/// and motions; with 0.47 in 25, with 0.36 in 17, with 0.7 in all. Runs shorter than 40 s have a shorter alignment, which
+/// removes less: the ratio grows with the inverse square root of its duration, up to 1.
 const ALIGNED_ERROR_RATIO: f64 = 0.55;
 
 /// The status is degraded if the bound exceeds both limits: in m, and as a fraction of the path length.

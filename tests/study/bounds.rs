@@ -4,7 +4,7 @@ use crate::command::run;
 use serde_json::Value;
 
 /// A head whose lidar does not constrain the height until it swings, and a hall in which the range correction is hard to estimate:
-/// 94.9 and 65 % of the poses were within their bounds, with the verdict good.
+/// 94.9 and 52 % of the poses were within their bounds, with the verdict good.
 #[test]
 fn poses_are_within_their_bounds_at_a_level_start_and_in_a_large_hall() {
     for command in

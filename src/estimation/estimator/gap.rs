@@ -63,7 +63,7 @@ impl Estimator {
             self.poses.last().into_iter().for_each(|last| map_localisation.restart_search(last.map_from_head));
             return GapRecovery::new(before, None, windows);
         }
-        old_map.add_segment(&window.seen_patches(), window.lidar(), self.spec.views.length_s, window.matcher());
+        old_map.add_segment(&window.seen_segment(self.spec.views.length_s), window.matcher());
         let relocalisation = GapRelocalisation::new(old_map, window.patches(), window.nominal.end_s());
         GapRecovery::new(before, Some(relocalisation), windows)
     }

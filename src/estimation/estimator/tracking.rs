@@ -79,8 +79,8 @@ impl Estimator {
             sensed.advance(window, at, until_s, observed);
         }
         self.gauge.advance(&mut local_map.consider, until_s, self.intake.stamp(tau_s));
-        let patches = window.remove_oldest(linearised)?;
-        local_map.add_segment(&patches, window.lidar(), self.spec.step_s, window.matcher());
+        let segment = window.remove_oldest(linearised)?;
+        local_map.add_segment(&segment, window.matcher());
         Some(until_s)
     }
 

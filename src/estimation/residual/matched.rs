@@ -10,7 +10,7 @@
 //! [`COMMON_WITHOUT_EXTRINSICS`] if the lidar extrinsics are not estimated.
 
 use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
-use super::{CLOCK, Layout};
+use super::{CLOCK, Layout, RANGE};
 use crate::estimation::spline::Basis;
 use crate::estimation::surfel::{Patch, PlacedSurfel, Sighting};
 use crate::geometry::{Matrix, Vector};
@@ -67,7 +67,7 @@ pub(in crate::estimation) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
 /// Common unknowns without extrinsics: clock offset, clock rate and range bias.
 pub(in crate::estimation) const COMMON_WITHOUT_EXTRINSICS: usize = 3;
 /// Index of the range bias in them.
-const RANGE_BIAS: usize = 2;
+const RANGE_BIAS: usize = RANGE - CLOCK;
 /// Common unknowns with extrinsics: also rotation and translation of the lidar.
 pub(in crate::estimation) const COMMON: usize = 9;
 
@@ -117,7 +117,8 @@ impl<const B: usize> SurfelJacobian<B> {
     }
 }
 
-/// Adds the Jacobian row of a match with derivatives `side` of a surfel with `basis`, scaled by `scales[k]`, to column `k` of six.
+/// Adds the Jacobian row of a match, scaled by `scales[k]`, to column `k` of six; `side` are its derivatives by the motion of
+/// a surfel with the spline basis `basis`.
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
@@ -135,7 +136,7 @@ pub(in crate::estimation) fn add_scaled_row(
 #[cfg(test)]
 mod tests {
     use super::super::sums::{Coupling, SpanSums, SurfelSums};
-    use super::super::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION, RANGE};
+    use super::super::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION};
     use super::*;
     use crate::estimation::nominal::Correction;
     use crate::estimation::normal_equations::NormalEquations;

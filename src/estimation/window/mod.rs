@@ -31,7 +31,7 @@ use super::strapdown::Interval;
 use super::surfel::{Detail, FINE, Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
-use super::views::SeenPatch;
+use super::views::{SeenPatch, SeenSegment};
 use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
@@ -172,9 +172,10 @@ impl Window {
         self.scene().into_iter().map(|placed| placed.patch).collect()
     }
 
-    /// The same, each with the way in which the lidar saw it.
-    pub(super) fn seen_patches(&self) -> Vec<SeenPatch> {
-        self.scene().iter().map(SeenPatch::from).collect()
+    /// All patches of the window as a segment of `seconds`.
+    pub(super) fn seen_segment(&self, seconds: f64) -> SeenSegment {
+        let patches = self.scene().iter().map(SeenPatch::from).collect();
+        SeenSegment { patches, lidar: self.lidar(), seconds }
     }
 
     /// Moves the window to the pose from relocalisation; from then on the map constrains it.
@@ -379,18 +380,18 @@ impl Window {
         surfels.iter().map(observed).collect()
     }
 
-    /// Removes the oldest segment, whose states become final; returns the patches of that segment in the map frame.
-    pub(super) fn remove_oldest(&mut self, linearised: Option<&Linearised>) -> Option<Vec<SeenPatch>> {
+    /// Removes the oldest segment, whose states become final; returns that segment in the map frame.
+    pub(super) fn remove_oldest(&mut self, linearised: Option<&Linearised>) -> Option<SeenSegment> {
         let start_s = self.next_start_s()?;
         let oldest = self.segments.pop_front()?;
-        let placed = oldest.surfels.iter().map(|surfel| SeenPatch::from(&surfel.place(&self.placing()))).collect();
+        let patches = oldest.surfels.iter().map(|surfel| SeenPatch::from(&surfel.place(&self.placing()))).collect();
         let by_lidar = linearised.and_then(|at| self.regression_on_lidar(start_s, at));
         self.start = Start { by_lidar, ..Start::continuing(start_s) };
         self.rests.forget_before(start_s);
         self.wide_matching = false;
         let fraction = 1.0 / (self.segments.len() + 1) as f64;
         self.border.carry_over(fraction, self.spec.step_s);
-        Some(placed)
+        Some(SeenSegment { patches, lidar: self.lidar(), seconds: self.spec.step_s })
     }
 
     /// The largest estimated scale error or misalignment of the IMU.
