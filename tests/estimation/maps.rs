@@ -203,31 +203,53 @@ fn an_incorrect_start_is_an_error_without_a_trajectory() {
     }
 }
 
+/// Surface errors of two maps, the worse of them, and of both merged and extended, m.
+struct Surfaces {
+    worse_part_m: f64,
+    merged_m: f64,
+    extended_m: f64,
+}
+
+impl Surfaces {
+    fn of(first: &Mapped, second: &Mapped) -> Self {
+        let world = World::load("office").unwrap();
+        let of = |map: &SurfelMap, at: &Pose| surface_rmse_m(map, at, &world);
+        let parts = [of(&first.map, &first.world_from_map), of(&second.map, &second.world_from_map)];
+        // Merged, from an approximate pose.
+        let truly = first.pose_of(second);
+        let about = displaced(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0);
+        let found = locate_map(&first.map, &second.map, &about, &spec()).unwrap();
+        let apart = truly.inverse() * found.map_from_query;
+        // Worst of ten pairs of seeds: 2.5 mm and 0.72 mrad.
+        assert!(apart.translation.vector.norm() < 0.0075 && apart.rotation.angle() < 0.0022, "{apart}");
+        let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();
+        assert!(merged.surfels().len() < first.map.surfels().len() + second.map.surfels().len());
+        // Extended: the second session adds surfels to the map of the first.
+        let start = second.session.start_in(&first.world_from_map);
+        let run = second.session.estimate(Some((&first.map, &start))).unwrap();
+        let (open, covariances) = (&run.trajectory, covariances(&run.poses));
+        let seen = map_of(&run.observed, open, open, &covariances, &spec().registration).unwrap();
+        let extended = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
+        Self {
+            worse_part_m: parts[0].max(parts[1]),
+            merged_m: of(&merged, &first.world_from_map),
+            extended_m: of(&extended, &first.world_from_map),
+        }
+    }
+}
+
+/// One pair of sessions says little: of eight pairs the ratio is 0.95 to 1.10.
 #[test]
 fn extended_and_merged_maps_are_as_accurate_as_their_parts() {
-    let (first, second) = (&*FIRST, &*SECOND);
-    let world = World::load("office").unwrap();
-    let of = |map: &SurfelMap, at: &Pose| surface_rmse_m(map, at, &world);
-    let parts = [of(&first.map, &first.world_from_map), of(&second.map, &second.world_from_map)];
-    // Merged, from an approximate pose.
-    let truly = first.pose_of(second);
-    let found =
-        locate_map(&first.map, &second.map, &displaced(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0), &spec()).unwrap();
-    let apart = truly.inverse() * found.map_from_query;
-    let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();
-    let both = of(&merged, &first.world_from_map);
-    println!("parts {parts:?} m, merged {both} m, pose error {:.4} m", apart.translation.vector.norm());
-    // Worst of ten pairs of seeds: 2.5 mm and 0.72 mrad.
-    assert!(apart.translation.vector.norm() < 0.0075 && apart.rotation.angle() < 0.0022, "{apart}");
-    assert!(both < 1.1 * parts[0].max(parts[1]), "{parts:?} and {both}");
-    assert!(merged.surfels().len() < first.map.surfels().len() + second.map.surfels().len());
-    // Extended: the second session adds surfels to the map of the first.
-    let start = second.session.start_in(&first.world_from_map);
-    let run = second.session.estimate(Some((&first.map, &start))).unwrap();
-    let (open, covariances) = (&run.trajectory, covariances(&run.poses));
-    let seen = map_of(&run.observed, open, open, &covariances, &spec().registration).unwrap();
-    let longer = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
-    let longer_off = of(&longer, &first.world_from_map);
-    println!("extended {longer_off} m");
-    assert!(longer_off < 1.1 * parts[0].max(parts[1]), "{parts:?} and {longer_off}");
+    let others = [(108, 209), (115, 216)].map(|(first, second)| {
+        let first = Mapped::by(Session::record(first, (0.0, 45.0)));
+        (first, Mapped::by(Session::record(second, (18.0, 42.0))))
+    });
+    let pairs = [(&*FIRST, &*SECOND)].into_iter().chain(others.iter().map(|(first, second)| (first, second)));
+    let surfaces: Vec<Surfaces> = pairs.map(|(first, second)| Surfaces::of(first, second)).collect();
+    let mean = |of: fn(&Surfaces) -> f64| surfaces.iter().map(of).sum::<f64>() / surfaces.len() as f64;
+    let (parts, merged, extended) = (mean(|s| s.worse_part_m), mean(|s| s.merged_m), mean(|s| s.extended_m));
+    println!("parts {parts} m, merged {merged} m, extended {extended} m");
+    assert!(merged < 1.1 * parts, "{parts} and {merged}");
+    assert!(extended < 1.1 * parts, "{parts} and {extended}");
 }
