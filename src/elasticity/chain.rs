@@ -1,6 +1,7 @@
 //! A chain of elements in series with massless inner nodes in equilibrium.
 
 use super::deformation::{blocks, split, stack};
+use super::solutions::Solutions;
 use super::{Deformation, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
 use crate::geometry::{Matrix, Pose, Rotation, Vector, left_jacobian, skew};
 
@@ -8,7 +9,9 @@ use crate::geometry::{Matrix, Pose, Rotation, Vector, left_jacobian, skew};
 const MAX_ITERATIONS: usize = 100;
 
 /// Convergence threshold of the residual force, as a fraction of axial stiffness times spring length.
-const TOLERANCE: f64 = 1e-12;
+///
+/// Close to buckling, the rest pose of a head is sensitive to residuals: with 1e-12, the largest mass was wrong by 2e-4.
+const TOLERANCE: f64 = 1e-13;
 
 /// The nodes of a chain, from the base (0) to the top (N), and the factorised Newton matrix.
 ///
@@ -18,10 +21,10 @@ const TOLERANCE: f64 = 1e-12;
 #[derive(Debug, Clone)]
 pub(super) struct Chain {
     nodes: Vec<Pose>,
+    /// The last solutions.
+    solutions: Solutions,
     residual: Vec<Vector6>,
     on_top: Vector6,
-    /// Whether the nodes are a converged solution, usable as the next start.
-    converged: bool,
     matrix: Option<Matrices>,
 }
 
@@ -40,9 +43,9 @@ impl Chain {
         let inner = segments - 1;
         Self {
             nodes: vec![Pose::identity(); segments + 1],
+            solutions: Solutions::default(),
             residual: vec![Vector6::zeros(); inner],
             on_top: Vector6::zeros(),
-            converged: false,
             matrix: None,
         }
     }
@@ -75,7 +78,7 @@ impl Chain {
 
     /// Moves the inner nodes into equilibrium for a top at `base_from_top`.
     ///
-    /// Starts from the last solution, or, if that fails, from a circular arc.
+    /// Starts from the nodes that [`Solutions::predict`] gives, or, if that fails, from a circular arc.
     pub(super) fn find_equilibrium(
         &mut self,
         elements: &[Element],
@@ -84,13 +87,19 @@ impl Chain {
     ) -> Result<(), ElasticityError> {
         let segments = self.nodes.len() - 1;
         self.nodes[segments] = *base_from_top;
-        if self.converged && self.iterate(elements, length_m).is_ok() {
-            return Ok(());
+        let mut result = Err(ElasticityError::InnerNodes { segments, residual_n: f64::NAN });
+        if self.solutions.predict(&mut self.nodes) {
+            result = self.iterate(elements, length_m);
         }
-        self.matrix = None;
-        self.place_on_arc(&Deformation::of(base_from_top).coordinates);
-        let result = self.iterate(elements, length_m);
-        self.converged = result.is_ok();
+        if result.is_err() {
+            self.solutions.forget();
+            self.matrix = None;
+            self.place_on_arc(&Deformation::of(base_from_top).coordinates);
+            result = self.iterate(elements, length_m);
+        }
+        if result.is_ok() {
+            self.solutions.add(&self.nodes);
+        }
         result
     }
 
@@ -213,7 +222,7 @@ struct Tangent {
 }
 
 impl Tangent {
-    /// Computes the derivatives by central differences in the top's displacement.
+    /// Computes the derivatives by differences in the top's displacement, with an error of about 1e-6, as a Newton step needs.
     ///
     /// Those by the base's displacement follow, since a rigid motion rotates the wrenches.
     fn of(element: &Element, base: &Pose, top: &Pose) -> Self {
@@ -223,13 +232,11 @@ impl Tangent {
         let (force, torque) = split(&wrench);
         let mut by_top = Matrix6::zeros();
         for k in 0..6 {
-            let moved = |h: f64| {
-                let (dp, dphi) = split(&Vector6::ith(k, h));
-                let rotation = Rotation::from_scaled_axis(dphi) * base_from_top.rotation;
-                element.wrench(&Pose::from_parts((p + dp).into(), rotation))
-            };
-            let h = 1e-6;
-            by_top.set_column(k, &((moved(h) - moved(-h)) / (2.0 * h)));
+            let h = 1e-7;
+            let (dp, dphi) = split(&Vector6::ith(k, h));
+            let rotation = Rotation::from_scaled_axis(dphi) * base_from_top.rotation;
+            let moved = element.wrench(&Pose::from_parts((p + dp).into(), rotation));
+            by_top.set_column(k, &((moved - wrench) / h));
         }
         // A displacement (d, phi) of the base equals (-d - phi x p, -phi) of the top relative to the base, and rotates
         // the wrench by phi.

@@ -25,6 +25,7 @@ mod helix;
 mod material;
 mod section;
 mod six_vector;
+mod solutions;
 mod spec;
 mod spring;
 
