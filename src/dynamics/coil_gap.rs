@@ -1,7 +1,8 @@
 //! The gap between the coils of a bent spring.
 
+use super::head::{HeadModel, Linkage};
 use super::mounted_spring::MountedSpring;
-use crate::elasticity::ElasticityError;
+use crate::elasticity::{ElasticityError, SpringState};
 use crate::geometry::{Pose, Vector};
 
 /// The smallest gap between the coils of a spring at one time.
@@ -13,6 +14,32 @@ pub struct CoilGap {
     pub bend_rad: f64,
 }
 
+/// The gaps between the coils of a head's springs, for one pose after the other.
+pub struct CoilGaps<'a> {
+    /// Each spring with the last solution for its inner nodes.
+    springs: Vec<(&'a MountedSpring, SpringState)>,
+}
+
+impl<'a> CoilGaps<'a> {
+    /// The gaps of `model`.
+    pub fn of(model: &'a HeadModel) -> Self {
+        let springs: &[MountedSpring] = match &model.linkage {
+            Linkage::Compliant(compliant) => &compliant.law.springs,
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => &[],
+        };
+        Self { springs: springs.iter().map(|mounted| (mounted, mounted.spring.state())).collect() }
+    }
+
+    /// The smallest gap between neighbouring coils of the springs with the head at a pose.
+    ///
+    /// `None` without a coil, or where a segmented spring has no equilibrium. Poses in sequence are faster than others.
+    pub fn smallest(&mut self, base_from_head: &Pose) -> Option<CoilGap> {
+        let gap = |(mounted, state): &mut (&MountedSpring, SpringState)| mounted.coil_gap(state, base_from_head);
+        let gaps = self.springs.iter_mut().filter_map(|spring| gap(spring).ok().flatten());
+        gaps.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+    }
+}
+
 impl MountedSpring {
     /// The smallest gap between neighbouring coils with the head at a pose; `None` for a spring given by stiffness.
     ///
@@ -20,10 +47,10 @@ impl MountedSpring {
     ///
     /// # Errors
     /// When a segmented spring has no equilibrium.
-    pub fn coil_gap(&self, base_from_head: &Pose) -> Result<Option<CoilGap>, ElasticityError> {
+    fn coil_gap(&self, state: &mut SpringState, base_from_head: &Pose) -> Result<Option<CoilGap>, ElasticityError> {
         let Some(coil) = &self.coil else { return Ok(None) };
         let foot_from_top = self.ends.foot_from_top(base_from_head);
-        let sections = self.spring.section_loads(&mut self.spring.state(), &foot_from_top)?;
+        let sections = self.spring.section_loads(state, &foot_from_top)?;
         let gap_m = sections.iter().map(|load| coil.inner_gap_m(load)).fold(f64::INFINITY, f64::min);
         let bend_rad = Vector::z().angle(&(foot_from_top.rotation * Vector::z()));
         Ok(Some(CoilGap { gap_m, bend_rad }))

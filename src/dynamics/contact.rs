@@ -1,5 +1,6 @@
 //! Contact of the coils of a spring during a simulation.
 
+use super::coil_gap::CoilGaps;
 use super::head::HeadModel;
 use crate::geometry::{Kinematics, Pose};
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,7 @@ pub struct CoilContact {
 
 /// Watches the springs of a head for contact of their coils.
 pub struct ContactWatch<'a> {
-    model: &'a HeadModel,
+    gaps: CoilGaps<'a>,
     checked_t_s: Option<f64>,
     contact: Option<CoilContact>,
 }
@@ -30,7 +31,7 @@ const INTERVAL_S: f64 = 5e-3;
 impl<'a> ContactWatch<'a> {
     /// A watch of a simulation of `model`.
     pub fn new(model: &'a HeadModel) -> Self {
-        Self { model, checked_t_s: None, contact: None }
+        Self { gaps: CoilGaps::of(model), checked_t_s: None, contact: None }
     }
 
     /// Checks a state at `t_s` after the start; states within 5 ms of the last check are passed over.
@@ -42,7 +43,7 @@ impl<'a> ContactWatch<'a> {
         }
         self.checked_t_s = Some(t_s);
         let base_from_head: Pose = base.world_from_body.inv_mul(&head.world_from_body);
-        let Some(gap) = self.model.coil_gap(&base_from_head).filter(|gap| gap.gap_m < 0.0) else { return };
+        let Some(gap) = self.gaps.smallest(&base_from_head).filter(|gap| gap.gap_m < 0.0) else { return };
         let contact = self.contact.get_or_insert(CoilContact {
             first_t_s: t_s,
             first_bend_deg: gap.bend_rad.to_degrees(),

@@ -125,13 +125,18 @@ impl EndFrames {
 
     pub fn at(&self, now: &MotionState<'_>) -> RelativePose {
         let world_from_foot = now.base.world_from_body * self.base_from_foot;
-        let foot_from_top = world_from_foot.inv_mul(&(now.world_from_head * self.head_from_top));
+        let foot_from_top = self.foot_from_top_in_world(&now.base.world_from_body, now.world_from_head);
         RelativePose {
             foot_from_top,
             deformation: Deformation::of(&foot_from_top),
             axes: world_from_foot.rotation.to_rotation_matrix().into_inner(),
             lever: now.lever(&self.head_from_top.translation.vector),
         }
+    }
+
+    /// Pose of the top relative to the foot, from the poses of base and head in the world.
+    pub fn foot_from_top_in_world(&self, world_from_base: &Pose, world_from_head: &Pose) -> Pose {
+        (world_from_base * self.base_from_foot).inv_mul(&(world_from_head * self.head_from_top))
     }
 
     /// Pose of the top relative to the foot.

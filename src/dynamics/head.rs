@@ -3,7 +3,6 @@
 use super::actuated::Actuated;
 use super::body::Body;
 use super::carrier;
-use super::coil_gap::CoilGap;
 use super::compliant::{CompliantLinkage, ElementLoad};
 use super::error::DynamicsError;
 use super::forces::MotionState;
@@ -124,15 +123,6 @@ impl HeadModel {
             Linkage::Rigid { .. } | Linkage::Actuated(_) => Vec::new(),
             Linkage::Compliant(compliant) => compliant.element_loads(),
         }
-    }
-
-    /// The smallest gap between neighbouring coils of the springs with the head at a pose.
-    ///
-    /// `None` without a coil, or where a segmented spring has no equilibrium.
-    pub fn coil_gap(&self, base_from_head: &Pose) -> Option<CoilGap> {
-        let Linkage::Compliant(compliant) = &self.linkage else { return None };
-        let gaps = compliant.law.springs.iter().filter_map(|spring| spring.coil_gap(base_from_head).ok().flatten());
-        gaps.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
     }
 
     /// Upper bound of the natural frequencies, with hand hold and end stop, Hz.

@@ -37,7 +37,7 @@ pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;
 pub use capacity::{MassLimit, max_head_mass, stands_with_mass};
 pub use carrier::CarrierSpec;
-pub use coil_gap::CoilGap;
+pub use coil_gap::{CoilGap, CoilGaps};
 pub use compliant::{ElementKind, ElementLoad};
 pub use contact::{CoilContact, ContactWatch};
 pub use elements::{

@@ -207,13 +207,17 @@ impl<'a> CompliantMotion<'a> {
         let inertia = mass.fixed_view::<3, 3>(3, 3);
         let contact = self.contact.impulse(&forces.contact, part.length_s);
         let other = forces.wrench - forces.contact;
-        let mut change = Vector6::zeros();
-        // Fixed-point iteration: each pass changes the gyroscopic torque by at most 1 %.
-        for _ in 0..3 {
+        let (mut change, mut quadratic) = (Vector6::zeros(), Vector6::zeros());
+        // Fixed-point iteration: each pass changes the gyroscopic torque by at most 1 %, and the quadratic forces, which are
+        // smaller, less.
+        for pass in 0..3 {
             let mean = now.twist + change * 0.5;
             let (_, turning) = split(&mean);
             let gyroscopic = stack(&Vector::zeros(), &-turning.cross(&(inertia * turning)));
-            let push = other + weight + gyroscopic + law.quadratic_forces(&now, &mean);
+            if pass < 2 {
+                quadratic = law.quadratic_forces(&now, &mean);
+            }
+            let push = other + weight + gyroscopic + quadratic;
             change = implicit.solve(&(push * self.step_s + contact));
             if let Some(joint) = &joint {
                 change = part.constrained(joint, &now, &change, &implicit)?;

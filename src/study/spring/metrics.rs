@@ -3,7 +3,7 @@
 use super::Shake;
 use super::margins::{LoadRecord, SpringMargins};
 use super::model::{SpringModel, at_rest};
-use crate::dynamics::{AccelerationKind, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState};
+use crate::dynamics::{AccelerationKind, CoilGaps, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState};
 use crate::elasticity::split;
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
@@ -112,12 +112,13 @@ pub fn simulated(
     let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
     let motion = ShakeAboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
     let (mut loads, mut step) = (LoadRecord::new(&model, &at_rest(&head)), 0_usize);
+    let mut gaps = CoilGaps::of(&head);
     let coverage = coverage(&head, &motion, lidar, plan, |state| {
         step += 1;
         // A period has hundreds of steps, so every tenth is sufficient for the maximum.
         if step.is_multiple_of(10) {
             let base_from_head = state.base.world_from_body.inv_mul(&state.head.world_from_body);
-            loads.add(state, head.coil_gap(&base_from_head).map(|gap| gap.gap_m));
+            loads.add(state, gaps.smallest(&base_from_head).map(|gap| gap.gap_m));
         }
     })?;
     let swing = SwingResult {
