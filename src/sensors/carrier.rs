@@ -1,5 +1,5 @@
 use super::{CanopyPart, Scenery, SurfaceHit, Track};
-use crate::geometry::Vector;
+use crate::geometry::{Pose, Vector};
 use crate::world::{Ray, TimedRay};
 
 /// An upright cylinder with closed ends, fixed in the base frame: an operator's body, a handle, the mast of a cart.
@@ -23,6 +23,11 @@ impl Cylinder {
         let beyond_end = (from_foot.z - 0.5 * self.height_m).abs() - 0.5 * self.height_m;
         let nearest_from_inside = -beyond_side.max(beyond_end);
         if nearest_from_inside >= 0.0 { nearest_from_inside } else { beyond_side.max(0.0).hypot(beyond_end.max(0.0)) }
+    }
+
+    /// Upper bound of the distance of its points from the origin of the base, m.
+    fn reach_m(&self) -> f64 {
+        self.foot_in_base.norm() + self.height_m + self.radius_m
     }
 
     /// First intersection with a ray in the base frame, in front of the origin of the ray.
@@ -68,7 +73,74 @@ pub struct SceneryWithCarrier<'a> {
     pub base: &'a Track,
 }
 
+/// Rays that are tested together for the carrier.
+const GROUP: usize = 16;
+
+/// Bounds in the world of a solid of the carrier, during a block of rays: a sphere, and an infinite cylinder.
+struct Bounds {
+    centre: Vector,
+    /// Unit vector along the axis of the cylinder.
+    axis: Vector,
+    sphere_m: f64,
+    cylinder_m: f64,
+}
+
+impl Bounds {
+    /// The bounds of a solid whose base is at `world_from_base`, or displaced by up to `moved_m`.
+    fn of(solid: &Cylinder, world_from_base: &Pose, moved_m: f64) -> Self {
+        let half_m = 0.5 * solid.height_m;
+        // The rounding of the conditions below is far less than a micrometre.
+        let margin_m = moved_m + 1e-6;
+        Self {
+            centre: world_from_base.transform_point(&(solid.foot_in_base + Vector::z() * half_m).into()).coords,
+            axis: world_from_base.rotation * Vector::z(),
+            sphere_m: solid.radius_m.hypot(half_m) + margin_m,
+            cylinder_m: solid.radius_m + margin_m,
+        }
+    }
+
+    /// Whether any ray can hit that differs from `ray` by up to `shift_m` in the origin and `spread` in the direction.
+    fn can_be_hit(&self, ray: &Ray, shift_m: f64, spread: f64) -> bool {
+        let (from, direction) = (ray.origin_in_world - self.centre, &ray.direction_in_world);
+        let (square, slope) = (from.norm_squared(), from.dot(direction));
+        // At the farthest point of the solid, the rays are this far from `ray`.
+        let apart_m = shift_m + (square.sqrt() + self.sphere_m + shift_m) * spread;
+        let meets = |a: f64, b: f64, c: f64| c <= 0.0 || (b < 0.0 && b * b >= a * c);
+        if !meets(1.0, slope, square - (self.sphere_m + apart_m).powi(2)) {
+            return false;
+        }
+        let (height, climb) = (from.dot(&self.axis), direction.dot(&self.axis));
+        let radius_m = self.cylinder_m + apart_m;
+        meets(1.0 - climb * climb, slope - height * climb, square - height * height - radius_m * radius_m)
+    }
+}
+
+/// Whether any ray of a group can hit one of the solids.
+fn any_can_hit(solids: &[Bounds], group: &[TimedRay]) -> bool {
+    let middle = &group[group.len() / 2].ray;
+    let (mut shift, mut spread) = (0.0_f64, 0.0_f64);
+    for TimedRay { ray, .. } in group {
+        shift = shift.max((ray.origin_in_world - middle.origin_in_world).norm_squared());
+        spread = spread.max((ray.direction_in_world - middle.direction_in_world).norm_squared());
+    }
+    let (shift_m, spread) = (shift.sqrt(), spread.sqrt());
+    solids.iter().any(|solid| solid.can_be_hit(middle, shift_m, spread))
+}
+
 impl SceneryWithCarrier<'_> {
+    /// Bounds of the carrier's solids while `rays` are cast.
+    fn bounds(&self, rays: &[TimedRay]) -> Vec<Bounds> {
+        if rays.is_empty() {
+            return Vec::new();
+        }
+        let times = || rays.iter().map(|timed| timed.t_s);
+        let span_s = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+        let middle = self.base.pose(0.5 * (span_s.0 + span_s.1));
+        let of =
+            |solid: &Cylinder| Bounds::of(solid, &middle, self.base.displacement_m(span_s, &middle, solid.reach_m()));
+        self.carrier.iter().map(of).collect()
+    }
+
     /// The first solid of the carrier on a ray.
     fn carrier_hit(&self, timed: &TimedRay) -> Option<SurfaceHit> {
         let world_from_base = self.base.pose(timed.t_s);
@@ -88,7 +160,15 @@ impl Scenery for SceneryWithCarrier<'_> {
     }
 
     fn first_hits(&self, rays: &[TimedRay]) -> Vec<Option<SurfaceHit>> {
-        let carrier_hits: Vec<Option<SurfaceHit>> = rays.iter().map(|timed| self.carrier_hit(timed)).collect();
+        let solids = self.bounds(rays);
+        let mut carrier_hits = Vec::with_capacity(rays.len());
+        for group in rays.chunks(GROUP) {
+            if any_can_hit(&solids, group) {
+                carrier_hits.extend(group.iter().map(|timed| self.carrier_hit(timed)));
+            } else {
+                carrier_hits.resize(carrier_hits.len() + group.len(), None);
+            }
+        }
         let nearer = |(timed, hit): (&TimedRay, &Option<SurfaceHit>)| TimedRay {
             reach_m: hit.map_or(timed.reach_m, |hit| hit.range_m),
             ..*timed
@@ -106,7 +186,7 @@ impl Scenery for SceneryWithCarrier<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Kinematics, Pose, from_roll_pitch_yaw};
+    use crate::geometry::{Kinematics, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
     use std::f64::consts::FRAC_PI_2;
 
@@ -190,5 +270,41 @@ mod tests {
         let hidden = SceneryWithCarrier { scenery: &Wall(0.4), ..carried };
         assert_relative_eq!(hidden.first_hit(&along, &Vector::x(), 30.0, 0.7).unwrap().range_m, 0.4, epsilon = 1e-9);
         assert!(carried.first_hit(&along, &Vector::x(), 0.4, 0.7).is_none(), "out of range");
+    }
+
+    #[test]
+    fn rays_of_a_block_hit_the_carrier_as_single_rays_do() {
+        // A base that turns at 3 rad/s and moves at 1.4 m/s; rays in all directions, during 20 ms, from around the base.
+        let turning = |k: u32| {
+            let t_s = f64::from(k) * 0.01;
+            let pose =
+                Pose::from_parts(Vector::new(t_s, -t_s, 0.0).into(), from_roll_pitch_yaw(0.3, 0.2 * t_s, 3.0 * t_s));
+            let turning = Vector::new(0.0, 0.2, 3.0);
+            Kinematics {
+                velocity_in_world: Vector::new(1.0, -1.0, 0.0),
+                angular_velocity_in_world: turning,
+                ..Kinematics::at_rest(pose)
+            }
+        };
+        let base = Track::new(0, 0.01, (0..=100).map(turning).collect()).unwrap();
+        let handle = Cylinder { foot_in_base: Vector::zeros(), radius_m: 0.03, height_m: 0.2, reflectance: 0.1 };
+        let carrier = [operator(), handle];
+        let carried = SceneryWithCarrier { scenery: &Wall(3.0), carrier: &carrier, base: &base };
+        let ray = |k: u32| {
+            // Groups of 16 in similar directions, the others at random.
+            let wave = |rate: f64| (f64::from(if k % 2048 < 1024 { k / 16 } else { k }) * rate).sin();
+            let from = base.pose(0.5).translation.vector + Vector::new(wave(0.7), wave(1.1), wave(1.9)) * 0.8;
+            let fan = Vector::new(0.0, 0.01, -0.01) * f64::from(k % 16);
+            let direction_in_world = (Vector::new(wave(2.3), wave(2.9), wave(3.1)).normalize() + fan).normalize();
+            let ray = Ray { origin_in_world: from, direction_in_world };
+            TimedRay { ray, reach_m: 30.0, t_s: 0.49 + 0.02 * f64::from(k) / 5000.0 }
+        };
+        let rays: Vec<TimedRay> = (0..5000).map(ray).collect();
+        let single = |timed: &TimedRay| {
+            carried.first_hit(&timed.ray.origin_in_world, &timed.ray.direction_in_world, timed.reach_m, timed.t_s)
+        };
+        assert_eq!(carried.first_hits(&rays), rays.iter().map(single).collect::<Vec<_>>());
+        let on_carrier = rays.iter().filter(|timed| carried.carrier_hit(timed).is_some()).count();
+        assert!((100..2500).contains(&on_carrier), "{on_carrier}");
     }
 }

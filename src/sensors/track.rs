@@ -83,6 +83,19 @@ impl Track {
         }
     }
 
+    /// Upper bound of the displacement, m, of points fixed to the frame and at most `reach_m` from its origin, from where
+    /// they are with the frame at `world_from_frame` to where they are at any time from `from_s` to `to_s`.
+    pub fn displacement_m(&self, (from_s, to_s): (f64, f64), world_from_frame: &Pose, reach_m: f64) -> f64 {
+        let ((first, _), (last, _)) = (self.locate(from_s), self.locate(to_s));
+        let of = |segment: &Segment| {
+            let start = segment.pose(0.0);
+            let shift_m = (start.translation.vector - world_from_frame.translation.vector).norm();
+            let turn_rad = start.rotation.angle_to(&world_from_frame.rotation);
+            shift_m + segment.length_m() + (turn_rad + segment.turn_rad()) * reach_m
+        };
+        self.segments[first..=last].iter().map(of).fold(0.0, f64::max)
+    }
+
     fn locate(&self, t_s: f64) -> (usize, f64) {
         let steps = t_s / self.step_s - self.first as f64;
         let index = (steps.max(0.0) as usize).min(self.segments.len() - 1);
@@ -112,6 +125,16 @@ impl Segment {
             ],
             rotation,
         }
+    }
+
+    /// Upper bound of the shift from the start within the step, m.
+    fn length_m(&self) -> f64 {
+        self.position[1..].iter().map(Vector::norm).sum()
+    }
+
+    /// Upper bound of the rotation from the start within the step, rad.
+    fn turn_rad(&self) -> f64 {
+        self.turn.iter().map(Vector::norm).sum()
     }
 
     fn pose(&self, u: f64) -> Pose {
