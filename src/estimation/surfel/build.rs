@@ -3,6 +3,7 @@
 use super::element::FINE;
 use super::flatness::{self, SurfelThickness};
 use super::moments::Moments;
+use super::principal::{eigenvalues, eigenvector};
 use super::{Surfel, TimedReturn};
 use crate::estimation::nominal::{Motion, Nominal};
 use crate::estimation::spec::SurfelSpec;
@@ -186,15 +187,13 @@ impl SurfelBuilder {
         motion_at: impl Fn(f64) -> Motion,
     ) -> Option<SurfelThickness> {
         let covariance = moments.covariance();
-        let eigen = covariance.symmetric_eigen();
-        let mut order = [0, 1, 2];
-        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-        let [l1, l2, l3] = order.map(|k| eigen.eigenvalues[k].max(0.0));
+        let [l1, l2, l3] = eigenvalues(&covariance).map(|variance| variance.max(0.0));
         let planarity = 2.0 * (l2 - l1) / (l1 + l2 + l3).max(f64::MIN_POSITIVE);
         let thick2 = self.spec.max_thickness_sigmas.powi(2) * moments.mean_noise2();
         if planarity < self.spec.min_planarity || l1 > thick2 {
             return None;
         }
+        let normal_in_map = eigenvector(&covariance, l1)?;
         let tau_s = moments.mean_time_s();
         let motion = motion_at(tau_s);
         let imu_from_map = motion.rotation.transpose();
@@ -210,7 +209,7 @@ impl SurfelBuilder {
         if !sweeps {
             return None;
         }
-        let normal = calibrated_from_map * eigen.eigenvectors.column(order[0]);
+        let normal = calibrated_from_map * normal_in_map;
         if normal.dot(&beam).abs() < self.spec.max_incidence_deg.to_radians().cos() {
             return None;
         }
@@ -226,7 +225,7 @@ impl SurfelBuilder {
         };
         Some(SurfelThickness {
             surfel,
-            is_upright: eigen.eigenvectors.column(order[0]).z.abs() < MAX_WALL_NORMAL_Z,
+            is_upright: normal_in_map.z.abs() < MAX_WALL_NORMAL_Z,
             variance: l1,
             noise_variance: flatness::noise_across(moments.mean_noise2(), normal.dot(&beam)),
         })

@@ -8,6 +8,7 @@ mod build;
 mod element;
 mod flatness;
 mod moments;
+mod principal;
 
 pub(super) use build::{Detail, SurfelBuilder};
 pub(super) use element::{FINE, Patch, PlacedSurfel, PlacementState, Sighting, Surfel, TimedReturn, voxel_edge_m};
