@@ -78,7 +78,7 @@ impl Matcher {
     /// Builds a tree for each resolution.
     pub(super) fn build_trees(&self, patches: &[Patch]) -> SearchTrees {
         let build = |level| Level::of(level, patches, |patch| self.feature(patch));
-        SearchTrees { levels: (0..=FINE).map(build).collect() }
+        SearchTrees { levels: (0..=FINE).into_par_iter().map(build).collect() }
     }
 
     /// The `count` patches nearest to `patch` in six dimensions, nearest first.

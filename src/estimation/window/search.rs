@@ -11,6 +11,9 @@ use rayon::prelude::*;
 /// Widening of the match gate in a first window that starts in motion, and after a bridged gap.
 const WIDE_GATE: f64 = 3.0;
 
+/// Candidates that a thread takes at once.
+const CANDIDATES: usize = 1024;
+
 /// A tilt of a normal is significant above this multiple of the standard deviation.
 const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
@@ -61,9 +64,11 @@ impl Window {
             let plane = plane(*a, &other)?;
             Some(Match { a: *a, with: Counterpart::Fixed { view: *view, patch: *patch, sighting }, plane })
         };
-        let mut all: Vec<Option<Match>> = neighbours.pairs.par_iter().with_min_len(512).map(live).collect();
-        all.par_extend(neighbours.fixed.par_iter().with_min_len(512).map(fixed));
-        Matches::of(all.into_iter().flatten().collect(), scene)
+        // By chunks: most candidates fail a gate, and are not stored.
+        let mut all: Vec<Match> =
+            neighbours.pairs.par_chunks(CANDIDATES).flat_map_iter(|pairs| pairs.iter().filter_map(live)).collect();
+        all.par_extend(neighbours.fixed.par_chunks(CANDIDATES).flat_map_iter(|pairs| pairs.iter().filter_map(fixed)));
+        Matches::of(all, scene)
     }
 
     /// Removes the component along `direction` from normals whose tilt towards it is within the normal error.

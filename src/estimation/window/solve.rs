@@ -6,7 +6,7 @@ use super::equations::Robust;
 use super::linearised::Linearised;
 use crate::estimation::nominal::Correction;
 use crate::estimation::residual::Layout;
-use crate::estimation::residual::matched::{MIN_SIGNIFICANT_TILT, Plane};
+use crate::estimation::residual::matched::MIN_SIGNIFICANT_TILT;
 use crate::estimation::surfel::{FINE, PlacedSurfel};
 use crate::estimation::timing::{Stopwatch, Timing};
 use crate::estimation::views::Views;
@@ -163,25 +163,29 @@ impl WindowSolution {
     fn record(&mut self, matches: &Matches, robust: &Robust, scene: &[PlacedSurfel]) {
         self.matches = matches.all.iter().filter(|one| matches!(one.with, Counterpart::Live(_))).count();
         self.view_matches = matches.all.len() - self.matches;
-        let (mut weights, mut squares) = (0.0, 0.0);
-        for plane in matches.planes() {
-            let weight = robust.weight(plane, plane.distance_m);
-            weights += weight;
-            squares += weight * plane.distance_m * plane.distance_m;
-        }
-        self.residual_rms_m = if weights > 0.0 { (squares / weights).sqrt() } else { 0.0 };
-        (self.conditioning, self.weakest) = conditioning(matches.planes(), robust);
+        let weights: Vec<f64> = matches.planes().map(|plane| robust.weight(plane, plane.distance_m)).collect();
+        let squares =
+            matches.planes().zip(&weights).map(|(plane, weight)| weight * plane.distance_m * plane.distance_m);
+        let (squares, sum) = (squares.sum::<f64>(), weights.iter().sum::<f64>());
+        self.residual_rms_m = if sum > 0.0 { (squares / sum).sqrt() } else { 0.0 };
+        let of = |is_used: &dyn Fn(&Match) -> bool| {
+            let used = matches.all.iter().zip(&weights).filter(|(one, _)| is_used(one));
+            conditioning(used.map(|(one, weight)| (one.plane.normal, *weight)))
+        };
+        (self.conditioning, self.weakest) = of(&|_| true);
         // Fine surfels add to the strong directions too. They must not make a direction that the usual ones constrain weak.
-        let is_usual = |one: &&Match| scene[one.a as usize].patch.level != FINE;
-        let (usual, _) = conditioning(matches.all.iter().filter(is_usual).map(|one| &one.plane), robust);
-        self.conditioning = self.conditioning.max(usual);
+        let is_usual = |one: &Match| scene[one.a as usize].patch.level != FINE;
+        if !matches.all.iter().all(is_usual) {
+            self.conditioning = self.conditioning.max(of(&is_usual).0);
+        }
     }
 }
 
-/// Smallest over largest eigenvalue of the position information of `planes`, and the least constrained direction.
-fn conditioning<'a>(planes: impl Iterator<Item = &'a Plane> + Clone, robust: &Robust) -> (f64, Vector) {
-    let weight = |plane: &Plane| robust.weight(plane, plane.distance_m);
-    let outer = |plane: &Plane| plane.normal * plane.normal.transpose() * weight(plane);
+/// Smallest over largest eigenvalue of the position information of planes, and the least constrained direction.
+///
+/// `planes` are normals and weights.
+fn conditioning(planes: impl Iterator<Item = (Vector, f64)> + Clone) -> (f64, Vector) {
+    let outer = |(normal, weight): (Vector, f64)| normal * (normal * weight).transpose();
     let information = planes.clone().map(outer).fold(Matrix::zeros(), |sum, term| sum + term);
     let eigen = information.symmetric_eigen();
     let largest = eigen.eigenvalues.max();
@@ -190,7 +194,7 @@ fn conditioning<'a>(planes: impl Iterator<Item = &'a Plane> + Clone, robust: &Ro
     }
     let weakest: Vector = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
     // In a smooth tunnel normals tilt along the axis only by error; the sum of the errors would count as information.
-    let along = |plane: &Plane| Some(plane.normal.dot(&weakest)).filter(|tilt| tilt.abs() > MIN_SIGNIFICANT_TILT);
-    let least = planes.filter_map(|plane| along(plane).map(|tilt| weight(plane) * tilt * tilt));
-    (least.fold(0.0, |sum, term| sum + term) / largest, weakest)
+    let along = |(normal, weight): (Vector, f64)| (normal.dot(&weakest), weight);
+    let significant = planes.map(along).filter(|(tilt, _)| tilt.abs() > MIN_SIGNIFICANT_TILT);
+    (significant.map(|(tilt, weight)| weight * tilt * tilt).sum::<f64>() / largest, weakest)
 }
