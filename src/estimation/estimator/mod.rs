@@ -143,7 +143,8 @@ impl Estimator {
     /// Advances the estimate by a segment.
     fn advance(&mut self, segment: Segment) -> Result<(), EstimationError> {
         let mut phase = std::mem::take(&mut self.phase);
-        let advanced = self.advance_phase(&mut phase, segment);
+        // On a thread of the pool, so that each of the many short parallel steps need not wait for another thread to wake up.
+        let advanced = rayon::scope(|_| self.advance_phase(&mut phase, segment));
         self.phase = phase;
         advanced
     }
