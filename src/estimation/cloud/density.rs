@@ -70,19 +70,13 @@ impl Density {
         Self { codes: cells.into_iter().map(|(code, _)| code).collect(), cumulative }
     }
 
-    /// Whether a point of a block has enough neighbours in the eight nearest cells of the level that fits its range.
-    ///
-    /// `of_block` is the density of its block alone.
-    pub(super) fn is_sufficient_at(&self, hit: &ProjectedReturn, of_block: &Self) -> bool {
-        let level = level_at(hit.range_m());
-        // The points of its block in its own cell suffice for most points, and are counted fastest.
-        [of_block, self].iter().any(|density| density.count(&hit.point_in_map, level) >= MIN_POINTS)
-            || self.count_around(&hit.point_in_map, level) >= MIN_POINTS
-    }
-
     /// Number of points in the cell of `level` that contains `point`.
     fn count(&self, point: &Vector, level: u32) -> u32 {
-        let code = morton_code(coordinates(point, level), level);
+        self.count_in(morton_code(coordinates(point, level), level), level)
+    }
+
+    /// Number of points in the cell of `level` with this Morton code.
+    fn count_in(&self, code: u64, level: u32) -> u32 {
         let (first, last) = (code << (3 * level), (code + 1) << (3 * level));
         let from = self.codes.partition_point(|n| *n < first);
         // A cell contains few finest cells: look at the next ones before the others.
@@ -106,6 +100,35 @@ impl Density {
     }
 }
 
+/// Finds points with too few neighbours, one after the other: successive points are mostly in the same cell.
+#[derive(Debug)]
+pub(super) struct IsolationTest<'a> {
+    /// Density of the block of the points, and of all blocks around it.
+    of_block: &'a Density,
+    around: &'a Density,
+    /// The last cell, by level and Morton code, and whether the points in it suffice.
+    last: Option<((u32, u64), bool)>,
+}
+
+impl<'a> IsolationTest<'a> {
+    pub(super) fn new(of_block: &'a Density, around: &'a Density) -> Self {
+        Self { of_block, around, last: None }
+    }
+
+    /// Whether a point has enough neighbours in the eight nearest cells of the level that fits its range.
+    pub(super) fn is_sufficient_at(&mut self, hit: &ProjectedReturn) -> bool {
+        let level = level_at(hit.range_m());
+        let cell = (level, morton_code(coordinates(&hit.point_in_map, level), level));
+        let is_dense = match self.last {
+            Some((last, is_dense)) if last == cell => is_dense,
+            // The points of its block in its own cell suffice for most points, and are counted fastest.
+            _ => [self.of_block, self.around].iter().any(|density| density.count_in(cell.1, level) >= MIN_POINTS),
+        };
+        self.last = Some((cell, is_dense));
+        is_dense || self.around.count_around(&hit.point_in_map, level) >= MIN_POINTS
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,7 +145,7 @@ mod tests {
             let aside = |by_m: f64| hit(at + Vector::new(0.0, 0.6, 0.8) * by_m, 3.0);
             let sufficient = |hits: &[ProjectedReturn]| {
                 let density = Density::from_blocks([BlockCounts::from_returns(hits)].iter());
-                density.is_sufficient_at(&hits[0], &density)
+                IsolationTest::new(&density, &density).is_sufficient_at(&hits[0])
             };
             assert!(!sufficient(&[aside(0.0)]));
             assert!(!sufficient(&[aside(0.0), aside(0.01), aside(0.02)]));
@@ -138,7 +161,7 @@ mod tests {
         let blocks = [0.0, 0.12, -0.12, 0.15].map(|by_m| BlockCounts::from_returns(&[far(by_m)]));
         let of_block = Density::from_blocks(blocks[..1].iter());
         let sufficient = |blocks: &[BlockCounts], at: ProjectedReturn| {
-            Density::from_blocks(blocks.iter()).is_sufficient_at(&at, &of_block)
+            IsolationTest::new(&of_block, &Density::from_blocks(blocks.iter())).is_sufficient_at(&at)
         };
         assert!(sufficient(&blocks, far(0.0)));
         assert!(!sufficient(&blocks[..3], far(0.0)));

@@ -22,7 +22,7 @@ pub use sigma::point_sigma_m;
 
 use crate::measurement::LidarNoise;
 use crate::time::{Span, Stamp};
-use density::{BlockCounts, Density};
+use density::{BlockCounts, Density, IsolationTest};
 use dynamic::{DynamicCells, FreeSpace};
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -31,6 +31,9 @@ use std::collections::VecDeque;
 const BLOCK: Span = Span::from_nanos(1_000_000_000);
 /// Number of blocks before, and after, that are used to classify a block.
 const CONTEXT_BLOCKS: usize = 5;
+
+/// Number of returns that a thread classifies at once.
+const RETURNS_TOGETHER: usize = 2048;
 
 /// Class of a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -130,13 +133,17 @@ impl<T: Send + Sync> CloudFilter<T> {
         let block = &self.complete[self.classified];
         let of_block = Density::from_blocks([&block.counts].into_iter());
         let dynamic = DynamicCells::find(&block.counts, &free_spaces);
-        let class = |one: &PendingReturn<T>| match one {
-            PendingReturn { mixed: true, .. } => ReturnClass::MixedPixel,
-            PendingReturn { hit, .. } if !density.is_sufficient_at(hit, &of_block) => ReturnClass::Isolated,
-            PendingReturn { hit, .. } if dynamic.contains(&hit.point_in_map) => ReturnClass::Dynamic,
-            _ => ReturnClass::Static,
+        let classify = |returns: &[PendingReturn<T>]| -> Vec<ReturnClass> {
+            let mut isolation = IsolationTest::new(&of_block, &density);
+            let class = |one: &PendingReturn<T>| match one {
+                PendingReturn { mixed: true, .. } => ReturnClass::MixedPixel,
+                PendingReturn { hit, .. } if !isolation.is_sufficient_at(hit) => ReturnClass::Isolated,
+                PendingReturn { hit, .. } if dynamic.contains(&hit.point_in_map) => ReturnClass::Dynamic,
+                _ => ReturnClass::Static,
+            };
+            returns.iter().map(class).collect()
         };
-        let classes: Vec<ReturnClass> = block.returns.par_iter().with_min_len(512).map(class).collect();
+        let classes: Vec<ReturnClass> = block.returns.par_chunks(RETURNS_TOGETHER).flat_map_iter(classify).collect();
         let returns = std::mem::take(&mut self.complete[self.classified].returns);
         self.classified += 1;
         if self.classified > CONTEXT_BLOCKS {
