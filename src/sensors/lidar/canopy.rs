@@ -12,6 +12,9 @@ pub(super) const LEAF_COS_INCIDENCE: f64 = 2.0 / 3.0;
 /// has the distribution `1 - exp(-tau)` (Beer and Lambert), so it is `-ln(1 - draw)`. Coefficients of canopies that overlap
 /// add up.
 pub(super) fn stop(parts: &[CanopyPart], draw: f64) -> Option<(f64, f64)> {
+    if parts.is_empty() {
+        return None;
+    }
     let mut left = -(-draw).ln_1p();
     let mut from_m = f64::NEG_INFINITY;
     loop {

@@ -9,8 +9,9 @@ use rand_distr::{Distribution, StandardNormal};
 const WHITE_REFLECTANCE: f64 = 0.9;
 /// Detection odds above which an echo counts as certain: fewer than one miss in a million.
 const CERTAIN_ODDS: f64 = 1e6;
-/// Detection odds for which the power threshold is precomputed: most draws are below, so most beams need no `powf`.
-const FAST_PATH_ODDS: f64 = 100.0;
+/// The powers that are detected at odds of `2^k` are precomputed for `k` from minus this number to this number: for most beams
+/// the two around their odds decide, without `powf`.
+const OCTAVES: i32 = 24;
 
 /// Errors of a lidar in one run, sampled with a seed.
 #[derive(Debug, Clone)]
@@ -24,8 +25,8 @@ pub struct LidarErrors {
     half_power: f64,
     /// Power above which detection is certain, 1/m^2.
     certain_power: f64,
-    /// Power detected at odds of [`FAST_PATH_ODDS`], 1/m^2.
-    fast_path_power: f64,
+    /// Powers detected at odds of 0 and of `2^k` for each octave, and infinity, 1/m^2.
+    octave_powers: Vec<f64>,
     cos_grazing: f64,
     on: bool,
 }
@@ -36,13 +37,14 @@ impl LidarErrors {
         let spec = lidar.spec().errors.clone();
         let z: f64 = StandardNormal.sample(&mut seed.stream("lidar/bias"));
         let half_power = WHITE_REFLECTANCE / spec.detection.white_reach_m.powi(2);
+        let octaves = (-OCTAVES..=OCTAVES).map(|k| half_power * 2.0_f64.powi(k).powf(spec.detection.softness));
         Self {
             seed,
             bias_m: spec.range.bias_sigma_m * z,
             sigma: lidar.noise(),
             half_power,
             certain_power: half_power * CERTAIN_ODDS.powf(spec.detection.softness),
-            fast_path_power: half_power * FAST_PATH_ODDS.powf(spec.detection.softness),
+            octave_powers: [0.0].into_iter().chain(octaves).chain([f64::INFINITY]).collect(),
             cos_grazing: spec.grazing.from_deg.to_radians().cos(),
             on: lidar.spec().noise == Switch::On,
             spec,
@@ -62,8 +64,12 @@ impl LidarErrors {
     /// Whether an echo is detected, given a draw uniform in 0..1.
     pub(super) fn detects(&self, echo: &Echo, draw: f64) -> bool {
         let odds = draw / (1.0 - draw);
-        if echo.power >= self.certain_power || (echo.power > self.fast_path_power && odds <= FAST_PATH_ODDS) {
+        let above = octave_above(odds);
+        if echo.power >= self.certain_power || echo.power > self.octave_powers[above] {
             return true;
+        }
+        if echo.power <= self.octave_powers[above - 1] {
+            return false;
         }
         // P(power > half_power (u / (1 - u))^softness) is logistic in ln(power / half_power) / softness.
         echo.power > self.half_power * odds.powf(self.spec.detection.softness)
@@ -80,5 +86,40 @@ impl LidarErrors {
     pub(super) fn quantised_m(&self, range_m: f64) -> f64 {
         let step = self.spec.range.resolution_m;
         if step > 0.0 { (range_m / step).round() * step } else { range_m }
+    }
+}
+
+/// Index in [`LidarErrors::octave_powers`] of the least power that is detected at any odds up to the next octave's.
+fn octave_above(odds: f64) -> usize {
+    // The exponent of a floating-point number, with a bias of 1023.
+    let exponent = (odds.to_bits() >> 52) as i32 - 1023;
+    (exponent.clamp(-OCTAVES - 1, OCTAVES) + OCTAVES + 2) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensors::LidarSpec;
+    use crate::spec::{Kind, find, parse};
+
+    #[test]
+    fn octaves_decide_as_the_logistic_law() {
+        let source = find(Kind::Lidar, "utm30lx").unwrap();
+        let lidar = Lidar::new(&parse::<LidarSpec>(&source).unwrap(), &source).unwrap();
+        let errors = LidarErrors::new(&lidar, Seed(3));
+        let softness = errors.spec.detection.softness;
+        let (mut detected, mut all) = (0, 0);
+        for k in 0..4000 {
+            // Draws close to 0 and to 1 too, and powers around that of half of the detections.
+            let draw = 0.5 * (1.0 + (f64::from(k) * 0.7).sin()).powi(3).min(1.99999);
+            let power = errors.half_power * 10.0_f64.powf(3.0 * (f64::from(k) * 1.1).sin());
+            let echo = Echo { range_m: 5.0, power, cos_incidence: 1.0 };
+            let by_law =
+                power >= errors.certain_power || power > errors.half_power * (draw / (1.0 - draw)).powf(softness);
+            assert_eq!(errors.detects(&echo, draw), by_law, "power {power}, draw {draw}");
+            (detected, all) = (detected + usize::from(by_law), all + 1);
+        }
+        assert!((all / 4..3 * all / 4).contains(&detected), "{detected} of {all}");
+        assert!(!errors.detects(&Echo::default(), 0.0), "no light is never detected");
     }
 }
