@@ -142,6 +142,15 @@ pub fn register(
     calibration: &Calibration,
     spec: &EstimatorSpec,
 ) -> Result<ClosedLoop, EstimationError> {
+    // On a thread of the pool, as the open loop.
+    rayon::scope(|_| register_on_pool(input, calibration, spec))
+}
+
+fn register_on_pool(
+    input: RegistrationInput,
+    calibration: &Calibration,
+    spec: &EstimatorSpec,
+) -> Result<ClosedLoop, EstimationError> {
     let stamps = input.map_from_head.stamps();
     let Some(gaps) = Gaps::between(stamps) else { return register_without_gaps(input, calibration, spec) };
     let map_from_head = &gaps.shorten(input.map_from_head)?;
