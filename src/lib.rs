@@ -58,7 +58,7 @@
 //! - Input and output: [recording].
 //! - Simulation: [world], [motion], [dynamics], [sensors], [simulation].
 //! - Estimation: [estimation], [evaluation].
-//! - Applications: [report] and [study].
+//! - Applications: [report] and [study], with the feature `studies` (on by default).
 //!
 //! Simulation and estimation do not depend on each other; the test `tests/architecture.rs` enforces this.
 
@@ -71,11 +71,13 @@ pub mod measurement;
 pub mod motion;
 pub mod random;
 pub mod recording;
+#[cfg(feature = "studies")]
 pub mod report;
 pub mod sensors;
 pub mod signal;
 pub mod simulation;
 pub mod spec;
+#[cfg(feature = "studies")]
 pub mod study;
 pub mod surfel_map;
 pub mod time;

@@ -46,7 +46,7 @@ pub use elements::{
 };
 pub use error::DynamicsError;
 pub use head::HeadModel;
-pub(crate) use modes::natural_frequencies_hz;
+pub use modes::natural_frequencies_hz;
 pub use modes::{LinearModel, Mode, ModeKind};
 pub use response::{AccelerationKind, FrequencyResponse, GainPoints, Peak};
 pub use simulation::{HeadSimulation, HeadState};

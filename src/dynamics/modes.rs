@@ -151,7 +151,7 @@ fn unclassified_modes(mass: &Matrix6, free: &FreeMotions) -> Option<Vec<Unclassi
 /// Natural frequencies of a mass with a stiffness, Hz, lowest first.
 ///
 /// `None` if the mass matrix is not positive definite, or the stiffness is negative for a motion.
-pub(crate) fn natural_frequencies_hz(mass: &Matrix6, stiffness: &Matrix6) -> Option<Vec<f64>> {
+pub fn natural_frequencies_hz(mass: &Matrix6, stiffness: &Matrix6) -> Option<Vec<f64>> {
     let modes = unclassified_modes(mass, &FreeMotions::all(stiffness))?;
     modes.iter().map(|mode| (mode.square >= 0.0).then(|| mode.square.sqrt() / TAU)).collect()
 }
