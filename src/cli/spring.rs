@@ -10,9 +10,9 @@ use zsim::elasticity::SpringSpec;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
-use zsim::study::replace_text;
 use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
 use zsim::study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
+use zsim::study::{replace_bytes, replace_text};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one
@@ -58,7 +58,7 @@ enum Command {
 /// Write a head and its spring as a robot model: URDF (RViz, Foxglove), SDF (Gazebo) and MJCF (MuJoCo)
 ///
 /// The spring becomes six elastic joints with the modes of the head at rest; URDF has their stiffness as comments. The frames are
-/// those of recordings: base, head, laser, imu_link.
+/// those of recordings: base, head, laser, imu_link. The wire of the springs at rest is a mesh in the base frame, spring.stl.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim spring export handheld --out results/robot")]
 struct Export {
@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
 }
 
-/// Writes `head.urdf`, `head.sdf` and `head.xml`.
+/// Writes `head.urdf`, `head.sdf`, `head.xml`, and `spring.stl` of springs with coils.
 fn export(wanted: &Export, global: &Global) -> anyhow::Result<Completion> {
     let Subject { name, spec, source } = head_of(&wanted.file, &wanted.head)?;
     let exported = HeadExport::new(&spec, &HeadModel::new(&spec, &source)?)?;
@@ -102,7 +102,11 @@ fn export(wanted: &Export, global: &Global) -> anyhow::Result<Completion> {
     for (file, text) in &files {
         replace_text(&folder.join(file), text)?;
     }
-    let names = files.map(|(file, _)| file);
+    let mut names = files.map(|(file, _)| file).to_vec();
+    if let Some(mesh) = exported.spring_mesh()? {
+        replace_bytes(&folder.join("spring.stl"), &mesh)?;
+        names.push("spring.stl");
+    }
     output::print_result(global, &names.join("\n"), serde_json::json!({ "files": names }), Some(&folder))?;
     Ok(Completion::Done)
 }

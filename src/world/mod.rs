@@ -41,7 +41,7 @@ mod triangle;
 
 pub use canopy::CanopyCrossing;
 pub use error::WorldError;
-pub use export::MeshFormat;
+pub use export::{MeshFormat, stl};
 pub use material::{Material, MaterialId};
 pub use model::World;
 pub use placement::Placement;

@@ -19,12 +19,16 @@ pub(super) enum Link {
 }
 
 /// A spring to draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpringOutline {
-    foot: Pose,
-    head_from_top: Pose,
+    pub foot: Pose,
+    pub head_from_top: Pose,
     /// Mean radius, m; 0 for a spring specified by stiffness, of which only the axis is drawn.
-    radius_m: f64,
-    coils: f64,
+    pub radius_m: f64,
+    /// Radius of the wire, m.
+    pub wire_radius_m: f64,
+    /// Number of coils, with those at the ends.
+    pub coils: f64,
 }
 
 impl Link {
@@ -54,6 +58,11 @@ impl Link {
             }
             ElementSpec::Float(_) => None,
         }
+    }
+
+    /// The spring, if it is one.
+    pub fn spring(self) -> Option<SpringOutline> {
+        if let Self::Spring(spring) = self { Some(spring) } else { None }
     }
 
     /// The outline in the view plane, with the head at this pose in the base.
@@ -92,10 +101,13 @@ impl SpringOutline {
             Ok(SpringDesign::Coil(coil)) => Some(coil),
             _ => None,
         };
-        let (radius_m, coils) = wire
-            .zip(coil)
-            .map_or((0.0, 0.0), |(wire, coil)| (wire.coil_radius_m, coil.solid_length_m() / wire.diameter_m));
-        Self { foot, head_from_top, radius_m, coils }
+        let axis_only = Self { foot, head_from_top, radius_m: 0.0, wire_radius_m: 0.0, coils: 0.0 };
+        wire.zip(coil).map_or(axis_only, |(wire, coil)| Self {
+            radius_m: wire.coil_radius_m,
+            wire_radius_m: 0.5 * wire.diameter_m,
+            coils: coil.solid_length_m() / wire.diameter_m,
+            ..axis_only
+        })
     }
 
     /// The circle of the spring at its top end.

@@ -5,6 +5,8 @@ mod obj;
 mod part;
 mod stl;
 
+pub use stl::stl;
+
 use super::World;
 use part::Part;
 use std::path::Path;
@@ -47,7 +49,7 @@ impl World {
         match format {
             MeshFormat::Glb => glb::encode(self.name(), &parts),
             MeshFormat::Obj => Ok(obj::encode(self.name(), &parts).into_bytes()),
-            MeshFormat::Stl => stl::encode(&parts),
+            MeshFormat::Stl => stl(parts.iter().flat_map(|part| &part.triangles)),
         }
     }
 }

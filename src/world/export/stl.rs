@@ -1,22 +1,19 @@
 //! Binary STL.
 
-use super::part::Part;
+use crate::geometry::Vector;
 use stl_io::{Normal, Triangle, Vertex};
 
-/// The bytes of the file.
-pub(super) fn encode(parts: &[Part<'_>]) -> std::io::Result<Vec<u8>> {
-    let single = |v: &crate::geometry::Vector| [v.x as f32, v.y as f32, v.z as f32];
-    let faces: Vec<Triangle> = parts
-        .iter()
-        .flat_map(|part| &part.triangles)
-        .map(|[a, b, c]| {
-            let normal = (b - a).cross(&(c - a)).normalize();
-            Triangle {
-                normal: Normal::new(single(&normal)),
-                vertices: [a, b, c].map(|corner| Vertex::new(single(corner))),
-            }
-        })
-        .collect();
+/// Triangles as a binary STL file: corners counterclockwise from outside, m, accurate to single precision.
+///
+/// # Errors
+/// If there are more triangles than STL can count in 32 bits.
+pub fn stl<'a>(triangles: impl Iterator<Item = &'a [Vector; 3]>) -> std::io::Result<Vec<u8>> {
+    let single = |v: &Vector| [v.x as f32, v.y as f32, v.z as f32];
+    let face = |[a, b, c]: &[Vector; 3]| Triangle {
+        normal: Normal::new(single(&(b - a).cross(&(c - a)).normalize())),
+        vertices: [a, b, c].map(|corner| Vertex::new(single(corner))),
+    };
+    let faces: Vec<Triangle> = triangles.map(face).collect();
     let mut bytes = Vec::new();
     stl_io::write_stl(&mut bytes, faces.iter())?;
     Ok(bytes)

@@ -1,15 +1,18 @@
 //! A head on its spring as a robot model of other simulators: URDF, SDF and MJCF.
 //!
 //! The springs become three sliding and three turning joints between base and head, each with a stiffness and a damping. The model
-//! has the linear modes of the head at rest.
+//! has the linear modes of the head at rest. The wire of the springs is a mesh of its own.
 
 mod joints;
+mod mesh;
 mod mjcf;
 mod sdf;
 mod urdf;
 
+use super::outline::{Link, SpringOutline};
 use crate::dynamics::{Body, CarrierSpec, HeadModel, HeadSpec, LinearModel, PartSpec, natural_frequencies_hz};
 use crate::geometry::{Pose, Vector};
+use crate::world::stl;
 use joints::{ElasticJoint, RestModel};
 
 /// Greatest relative error of the model's natural frequencies.
@@ -50,6 +53,7 @@ pub struct HeadExport {
     /// Size and centre in the head frame of its blocks, m.
     blocks: Vec<([f64; 3], [f64; 3])>,
     carrier: Vec<CarrierSpec>,
+    springs: Vec<SpringOutline>,
 }
 
 impl HeadExport {
@@ -86,7 +90,18 @@ impl HeadExport {
             joints,
             blocks: spec.parts.iter().filter_map(block).collect(),
             carrier: spec.carrier.clone(),
+            springs: Link::all(&spec.linkage).into_iter().filter_map(Link::spring).collect(),
         })
+    }
+
+    /// The wire of all springs with the head at rest, in the base frame, m, as binary STL; `None` if none has a coil.
+    ///
+    /// # Errors
+    /// When the mesh is too large for the format.
+    pub fn spring_mesh(&self) -> std::io::Result<Option<Vec<u8>>> {
+        let surfaces = self.springs.iter().filter_map(|spring| mesh::wire_surface(spring, &self.base_from_head));
+        let surface: mesh::Surface = surfaces.flatten().collect();
+        if surface.is_empty() { Ok(None) } else { stl(surface.iter()).map(Some) }
     }
 }
 
