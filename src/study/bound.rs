@@ -53,7 +53,7 @@ pub fn information_bound(
     let selection = reader.select(&TopicPreference::default())?;
     let manifest = Manifest::in_recording(reader)?;
     let run = manifest.as_ref().and_then(|manifest| manifest.run.as_ref());
-    let mut bound = BoundAccumulator::new(reader, &selection, (world, map), run, Beams::All)?;
+    let mut bound = BoundAccumulator::new(reader, &selection, (world, map), run)?;
     for truth in reader.truth() {
         bound.add_truth(&truth?);
     }
@@ -85,24 +85,6 @@ fn model(run: Option<&Run>, calibration: &Calibration) -> BoundModel {
     }
 }
 
-/// Share of the beams that a bound uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Beams {
-    All,
-    /// Every fourth beam of a scan, with the weight of four. Neighbours hit the same surfaces: the bound differs by less than
-    /// 1 %, and takes a third of the time.
-    Fourth,
-}
-
-impl Beams {
-    fn stride(self) -> usize {
-        match self {
-            Self::All => 1,
-            Self::Fourth => 4,
-        }
-    }
-}
-
 /// Accumulates the information of a recording: first all of its truth, then its measurements.
 pub(super) struct BoundAccumulator<'a> {
     world: &'a World,
@@ -114,9 +96,6 @@ pub(super) struct BoundAccumulator<'a> {
     /// Time span of the truth, lidar time; `None` without truth.
     span: Option<(Stamp, Stamp)>,
     information: FisherInformation,
-    used: Beams,
-    /// Number of scans so far.
-    scans: usize,
     beams: u64,
     rejected: u64,
 }
@@ -130,7 +109,6 @@ impl<'a> BoundAccumulator<'a> {
         selection: &Selection,
         (world, map): (&'a World, MapKnowledge),
         run: Option<&Run>,
-        used: Beams,
     ) -> Result<Self, StudyError> {
         let recorded = run.map(RecordedSensors::of).unwrap_or_default();
         let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), recorded, None)?;
@@ -142,8 +120,6 @@ impl<'a> BoundAccumulator<'a> {
             imu_shift: selection.imu_shift(),
             clock: TrueClock::default(),
             span: None,
-            used,
-            scans: 0,
             beams: 0,
             rejected: 0,
         })
@@ -198,11 +174,7 @@ impl<'a> BoundAccumulator<'a> {
             let stamp = scan_motion.first + Span::from_nanos(step * TRUTH_STEP.nanos());
             scan_motion.states.push(truth.at(stamp)?);
         }
-        // Another beam of four from scan to scan, so that none is always left out.
-        let stride = self.used.stride();
-        let used: Vec<LidarReturn> = scan.returns.iter().skip(self.scans % stride).step_by(stride).copied().collect();
-        self.scans += 1;
-        let chunks = used.par_chunks(RAYS_TOGETHER);
+        let chunks = scan.returns.par_chunks(RAYS_TOGETHER);
         let beams: Vec<Option<BeamObservation>> =
             chunks.flat_map_iter(|hits| self.observations(scan, hits, &scan_motion)).collect();
         for beam in beams {
@@ -267,7 +239,7 @@ impl<'a> BoundAccumulator<'a> {
             hit_in_world,
             direction_in_world: ray.direction_in_world,
             normal_in_world: surface.normal_in_world,
-            range_sigma_m: self.calibration.lidar.sigma_m(surface.distance_m) / (self.used.stride() as f64).sqrt(),
+            range_sigma_m: self.calibration.lidar.sigma_m(surface.distance_m),
             plane,
         })
     }

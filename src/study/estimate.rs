@@ -2,7 +2,7 @@
 
 use super::background::with_background;
 use super::best_estimate::BestEstimate;
-use super::bound::{Beams, BoundAccumulator, RecordingBound};
+use super::bound::{BoundAccumulator, RecordingBound};
 use super::calibration::calibration;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
@@ -184,7 +184,6 @@ impl<'a> LoopInputs<'a> {
             self.selection,
             (world, MapKnowledge::Known),
             self.origin.manifest.run.as_ref(),
-            Beams::Fourth,
         )
         .map(Some)
     }
