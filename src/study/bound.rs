@@ -8,7 +8,7 @@ use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
 use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge};
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::measurement::{Calibration, ImuSample, LidarReturn, LidarScan, Measurement};
-use crate::recording::{Reader, Selection, TopicPreference, Truth};
+use crate::recording::{Reader, RecordingError, Selection, TopicPreference, Truth};
 use crate::sensors::ImuSpec;
 use crate::simulation::Run;
 use crate::time::{Span, Stamp};
@@ -167,13 +167,8 @@ impl<'a> BoundAccumulator<'a> {
 
     /// Adds the beams of the next scan.
     fn add_scan(&mut self, scan: &LidarScan, truth: &mut TruthCursor) -> Result<(), StudyError> {
-        let mut scan_motion = ScanMotion { first: scan.stamp - TRUTH_STEP, states: Vec::new() };
         let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
-        let steps = (sweep.nanos() / TRUTH_STEP.nanos()).max(0) + 3;
-        for step in 0..=steps {
-            let stamp = scan_motion.first + Span::from_nanos(step * TRUTH_STEP.nanos());
-            scan_motion.states.push(truth.at(stamp)?);
-        }
+        let scan_motion = ScanMotion::during(scan.stamp, sweep, truth)?;
         let chunks = scan.returns.par_chunks(RAYS_TOGETHER);
         let beams: Vec<Option<BeamObservation>> =
             chunks.flat_map_iter(|hits| self.observations(scan, hits, &scan_motion)).collect();
@@ -277,11 +272,19 @@ impl TrueBeam {
     }
 }
 
-/// True poses of the head during a scan.
+/// True motion of the head during a scan.
 struct ScanMotion {
     first: Stamp,
-    /// One state for each [`TRUTH_STEP`].
-    states: Vec<Option<TrueState>>,
+    /// One part for each [`TRUTH_STEP`]; `None` without truth.
+    parts: Vec<Option<MotionPart>>,
+}
+
+/// Uniform motion of the head for [`TRUTH_STEP`].
+struct MotionPart {
+    start: TrueState,
+    /// Translation and rotation vector, in the world.
+    shift: Vector,
+    turn: Vector,
 }
 
 /// True pose and velocity of the head at one time.
@@ -293,20 +296,40 @@ struct HeadMotion {
 }
 
 impl ScanMotion {
+    /// The motion from just before `stamp` to just after `sweep` later.
+    fn during(stamp: Stamp, sweep: Span, truth: &mut TruthCursor) -> Result<Self, RecordingError> {
+        let first = stamp - TRUTH_STEP;
+        let parts = (sweep.nanos() / TRUTH_STEP.nanos()).max(0) + 3;
+        let mut start = truth.at(first)?;
+        let mut scan_motion = Self { first, parts: Vec::new() };
+        for part in 1..=parts {
+            let end = truth.at(first + Span::from_nanos(part * TRUTH_STEP.nanos()))?;
+            scan_motion.parts.push(start.zip(end).map(|(start, end)| MotionPart::between(start, &end)));
+            start = end;
+        }
+        Ok(scan_motion)
+    }
+
     fn at(&self, stamp: Stamp) -> Option<HeadMotion> {
         let since = (stamp - self.first).nanos();
         let index = usize::try_from(since / TRUTH_STEP.nanos()).ok()?;
-        let (before, after) = ((*self.states.get(index)?)?, (*self.states.get(index + 1)?)?);
+        let MotionPart { start, shift, turn } = self.parts.get(index)?.as_ref()?;
         let u = (since % TRUTH_STEP.nanos()) as f64 / TRUTH_STEP.nanos() as f64;
-        let (a, b) = (before.world_from_head, after.world_from_head);
-        let shift = b.translation.vector - a.translation.vector;
-        let turn = (b.rotation * a.rotation.inverse()).scaled_axis();
-        let rotation = Rotation::from_scaled_axis(turn * u) * a.rotation;
+        let Pose { rotation, translation } = start.world_from_head;
+        let rotation = Rotation::from_scaled_axis(turn * u) * rotation;
         Some(HeadMotion {
-            world_from_head: Pose::from_parts((a.translation.vector + shift * u).into(), rotation),
+            world_from_head: Pose::from_parts((translation.vector + shift * u).into(), rotation),
             velocity_in_world: shift / TRUTH_STEP.seconds(),
             angular_velocity_in_world: turn / TRUTH_STEP.seconds(),
-            t_s: before.t_s + u * TRUTH_STEP.seconds(),
+            t_s: start.t_s + u * TRUTH_STEP.seconds(),
         })
+    }
+}
+
+impl MotionPart {
+    fn between(start: TrueState, end: &TrueState) -> Self {
+        let (a, b) = (start.world_from_head, end.world_from_head);
+        let turn = (b.rotation * a.rotation.inverse()).scaled_axis();
+        Self { start, shift: b.translation.vector - a.translation.vector, turn }
     }
 }

@@ -33,8 +33,6 @@ const MIN_INCIDENCE_COSINE: f64 = 0.02;
 
 /// Information of beams on attitude, position, current clock offset and range offset.
 pub(super) type BeamInformation = SMatrix<f64, 8, 8>;
-/// Number of entries of the lower triangle.
-const TRIANGLE: usize = 36;
 
 /// An epoch: the motion of the IMU, the mean of the IMU samples, and the information of the beams.
 #[derive(Debug, Clone)]
@@ -46,8 +44,8 @@ pub(super) struct Epoch {
     rate_sum: Vector,
     force_sum: Vector,
     samples: f64,
-    /// Fisher information of the beams: the lower triangle, row by row.
-    triangle: [f64; TRIANGLE],
+    /// Fisher information of the beams.
+    pub beam_information: BeamInformation,
 }
 
 impl Epoch {
@@ -61,7 +59,7 @@ impl Epoch {
             rate_sum: Vector::zeros(),
             force_sum: Vector::zeros(),
             samples: 0.0,
-            triangle: [0.0; TRIANGLE],
+            beam_information: BeamInformation::zeros(),
         }
     }
 
@@ -96,16 +94,7 @@ impl Epoch {
         row.fixed_rows_mut::<3>(3).copy_from(&by_position);
         (row[6], row[7]) = (by_clock, 1.0);
         row /= beam.range_sigma_m;
-        let products = (0..8).flat_map(|i| (0..=i).map(move |j| row[i] * row[j]));
-        self.triangle.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        self.beam_information += row * row.transpose();
         Some(by_clock)
-    }
-
-    /// Fisher information of the beams.
-    pub(super) fn beam_information(&self) -> BeamInformation {
-        BeamInformation::from_fn(|i, j| {
-            let (row, column) = (i.max(j), i.min(j));
-            self.triangle[row * (row + 1) / 2 + column]
-        })
     }
 }

@@ -3,7 +3,8 @@
 use super::epoch::Epoch;
 use super::model::{BoundModel, EPOCH};
 use super::state::{
-    ACCEL_BIAS, ACCEL_MATRIX, ATTITUDE, CLOCK, CLOCK_RATE, GYRO_BIAS, GYRO_MATRIX, N, POSITION, SUMS, State, VELOCITY,
+    ACCEL_BIAS, ACCEL_MATRIX, ATTITUDE, CHANGING, CLOCK, CLOCK_RATE, CONSTANT, GYRO_BIAS, GYRO_MATRIX, N, POSITION,
+    SUMS, State, VELOCITY,
 };
 use crate::geometry::{Matrix, Vector, skew};
 use nalgebra::SMatrix;
@@ -16,9 +17,9 @@ const MISSING_IMU_FACTOR: f64 = 1e4;
 
 /// Propagation from one epoch to the next.
 pub(super) struct Step {
-    /// Propagation of the errors.
+    /// `F`, the propagation of the errors: the rows from [`CHANGING`] on are those of the identity.
     pub transition: State,
-    /// The covariance of the process noise.
+    /// `Q`, the covariance of the process noise.
     pub noise: State,
 }
 
@@ -71,6 +72,29 @@ impl Step {
         let mut moments = transition.fixed_view_mut::<3, N>(SUMS + 3, 0);
         moments += moment;
         Self { transition, noise: noise(model, &pull, noise_factor) }
+    }
+
+    /// The covariance `P` of the errors after the step: `F P F^T + Q`.
+    pub(super) fn propagate(&self, covariance: &State) -> State {
+        let changing = self.transition.fixed_rows::<CHANGING>(0);
+        let of_changing = changing * covariance;
+        let mut propagated = *covariance;
+        propagated.fixed_rows_mut::<CHANGING>(0).copy_from(&of_changing);
+        propagated.fixed_columns_mut::<CHANGING>(0).copy_from(&of_changing.transpose());
+        propagated.fixed_view_mut::<CHANGING, CHANGING>(0, 0).copy_from(&(of_changing * changing.transpose()));
+        propagated + self.noise
+    }
+
+    /// `F^T L F`.
+    pub(super) fn propagate_back(&self, adjoint: &State) -> State {
+        let changing = self.transition.fixed_rows::<CHANGING>(0);
+        let mut after = adjoint.fixed_columns::<CHANGING>(0) * changing;
+        let mut of_constant = after.fixed_columns_mut::<CONSTANT>(CHANGING);
+        of_constant += adjoint.fixed_columns::<CONSTANT>(CHANGING);
+        let mut back = changing.transpose() * after.fixed_rows::<CHANGING>(0);
+        let mut of_constant = back.fixed_rows_mut::<CONSTANT>(CHANGING);
+        of_constant += after.fixed_rows::<CONSTANT>(CHANGING);
+        back
     }
 }
 

@@ -47,7 +47,7 @@ impl Run<'_> {
 
     /// `W` of the measurements of an epoch, for the measured states: `(I + M P)^-1 M` with the information `M`.
     fn weight(&self, index: usize, predicted: &State) -> Measured {
-        let information = with_rate(&self.epochs[index].beam_information(), self.since_start_s(index));
+        let information = with_rate(&self.epochs[index].beam_information, self.since_start_s(index));
         let known = Measured::from_fn(|i, j| predicted[(MEASURED_STATES[i], MEASURED_STATES[j])]);
         let weight = (Measured::identity() + information * known).lu().solve(&information);
         // I + M P has no eigenvalue below 1.
@@ -55,12 +55,10 @@ impl Run<'_> {
         (weight + weight.transpose()) * 0.5
     }
 
-    /// The predicted covariance of the epoch after `index`.
-    fn advance(&self, index: usize, predicted: &State) -> State {
+    /// The predicted covariance of the epoch after `index`; `weight` as from [`Self::weight`].
+    fn advance(&self, index: usize, predicted: &State, weight: &Measured) -> State {
         let across = measured_columns(predicted);
-        let updated = predicted - across * self.weight(index, predicted) * across.transpose();
-        let Step { transition, noise } = self.step(index);
-        symmetric(&(transition * updated * transition.transpose() + noise))
+        symmetric(&self.step(index).propagate(&(predicted - across * weight * across.transpose())))
     }
 }
 
@@ -93,7 +91,7 @@ pub(super) fn bound(model: &BoundModel, start: Stamp, epochs: &[Epoch]) -> Infor
             checkpoints.push(predicted);
         }
         if index + 1 < epochs.len() {
-            predicted = run.advance(index, &predicted);
+            predicted = run.advance(index, &predicted, &run.weight(index, &predicted));
         }
     }
     let alignment_reduction = alignment_reduction(&run, &predicted);
@@ -144,17 +142,18 @@ fn smooth_backwards(run: &Run<'_>, checkpoints: &[State], found: &mut Variances)
     for (section, first) in checkpoints.iter().enumerate().rev() {
         let from = section * CHECKPOINT_INTERVAL;
         let to = (from + CHECKPOINT_INTERVAL).min(run.epochs.len());
-        let mut predicted = vec![*first];
-        for index in from..to - 1 {
-            predicted.push(run.advance(index, &predicted[index - from]));
+        let mut filtered = vec![(*first, run.weight(from, first))];
+        for index in from + 1..to {
+            let (before, weight) = &filtered[index - 1 - from];
+            let predicted = run.advance(index - 1, before, weight);
+            filtered.push((predicted, run.weight(index, &predicted)));
         }
         for index in (from..to).rev() {
-            let at = &predicted[index - from];
-            let adjoint = updated(&run.weight(index, at), at, &later);
-            smooth(run, index, at, &adjoint, found);
+            let (predicted, weight) = &filtered[index - from];
+            let adjoint = updated(weight, predicted, &later);
+            smooth(run, index, predicted, &adjoint, found);
             if index > 0 {
-                let transition = run.step(index - 1).transition;
-                later = symmetric(&(transition.transpose() * adjoint * transition));
+                later = symmetric(&run.step(index - 1).propagate_back(&adjoint));
             }
         }
     }
@@ -162,14 +161,20 @@ fn smooth_backwards(run: &Run<'_>, checkpoints: &[State], found: &mut Variances)
 
 /// `L~` of an epoch; `later` is `L^`, from the later epochs.
 fn updated(weight: &Measured, predicted: &State, later: &State) -> State {
-    let mut full_weight = State::zeros();
+    // The rows of I - W P that are not those of the identity. The differences are formed first: the products with `later`
+    // are much larger than their sums.
+    let mut rows: SMatrix<f64, 9, N> = -(weight * measured_columns(predicted).transpose());
+    MEASURED_STATES.iter().enumerate().for_each(|(i, row)| rows[(i, *row)] += 1.0);
+    let (mut left, by_left) = (*later, rows * later);
+    MEASURED_STATES.iter().enumerate().for_each(|(i, row)| left.set_row(*row, &by_left.row(i)));
+    let (mut both, by_right) = (left, left * rows.transpose());
+    MEASURED_STATES.iter().enumerate().for_each(|(j, column)| both.set_column(*column, &by_right.column(j)));
     for (i, row) in MEASURED_STATES.iter().enumerate() {
         for (j, column) in MEASURED_STATES.iter().enumerate() {
-            full_weight[(*row, *column)] = weight[(i, j)];
+            both[(*row, *column)] += weight[(i, j)];
         }
     }
-    let left = State::identity() - full_weight * predicted;
-    symmetric(&(full_weight + left * later * left.transpose()))
+    symmetric(&both)
 }
 
 /// Computes the smoothed variances of the epoch at `index`; `adjoint` is from the later epochs.
@@ -221,4 +226,73 @@ fn alignment_reduction(run: &Run<'_>, last: &State) -> f64 {
     // If all positions are on a line, a rotation about it is not observable.
     let tolerance = 1e-12 * normal.trace();
     normal.pseudo_inverse(tolerance).map_or(0.0, |inverse| (inverse * spread).trace())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2};
+    use crate::measurement::{ImuNoise, ImuSample};
+    use approx::assert_relative_eq;
+
+    fn model() -> BoundModel {
+        BoundModel {
+            head_from_imu: Pose::translation(0.03, -0.02, 0.05),
+            imu: ImuNoise {
+                gyro_density_rad_per_s_per_sqrt_hz: 1e-3,
+                accel_density_m_per_s2_per_sqrt_hz: 1e-2,
+                gyro_bias_walk_rad_per_s_per_sqrt_s: 1e-4,
+                accel_bias_walk_m_per_s2_per_sqrt_s: 1e-3,
+                gyro_turn_on_bias_rad_per_s: 0.01,
+                accel_turn_on_bias_m_per_s2: 0.1,
+                gyro_limit_rad_per_s: 10.0,
+                accel_limit_m_per_s2: 50.0,
+            },
+            gyro_matrix: (0.01, 0.005),
+            accel_matrix: (0.01, 0.005),
+            range_offset_m: 0.01,
+            clock_offset_s: 0.01,
+            clock_rate: 1e-4,
+        }
+    }
+
+    /// Two epochs in motion, with an IMU sample each.
+    fn epochs() -> [Epoch; 2] {
+        [0.0, EPOCH.seconds()].map(|t_s| {
+            let at = |t_s: f64| {
+                let turn = crate::geometry::Rotation::from_scaled_axis(Vector::new(0.4, -0.7, 1.1) * (1.0 + t_s));
+                Pose::from_parts(Vector::new(1.0, 0.6 * t_s, -0.3 * t_s).into(), turn)
+            };
+            let mut epoch = Epoch::new(&at(t_s), &at(t_s - 1e-3), 1e-3);
+            epoch.add_imu_sample(&ImuSample {
+                stamp: Stamp::default(),
+                angular_velocity_rad_per_s: Vector::new(0.4, -0.7, 1.1),
+                specific_force_m_per_s2: Vector::new(0.3, -0.2, STANDARD_GRAVITY_M_PER_S2),
+            });
+            epoch
+        })
+    }
+
+    /// A covariance or information with unequal entries.
+    fn positive(seed: f64) -> State {
+        let root = State::from_fn(|i, j| ((i * 17 + j * 5) as f64 * 0.37 + seed).sin());
+        root * root.transpose()
+    }
+
+    #[test]
+    fn the_products_of_the_non_zero_blocks_are_those_of_the_whole_matrices() {
+        let epochs = epochs();
+        let step = Step::between(&model(), &epochs[0], &epochs[1], &Vector::new(0.1, 0.2, 0.3), 7.0);
+        let (f, p, l) = (step.transition, positive(0.1), positive(0.7));
+        assert_relative_eq!(step.propagate(&p), f * p * f.transpose() + step.noise, max_relative = 1e-10);
+        assert_relative_eq!(step.propagate_back(&l), f.transpose() * l * f, epsilon = 1e-10, max_relative = 1e-10);
+        let weight = Measured::from_fn(|i, j| l[(i, j)] / p.trace());
+        let mut whole = State::zeros();
+        for (i, row) in MEASURED_STATES.iter().enumerate() {
+            MEASURED_STATES.iter().enumerate().for_each(|(j, column)| whole[(*row, *column)] = weight[(i, j)]);
+        }
+        let left = State::identity() - whole * p;
+        let expected = whole + left * l * left.transpose();
+        assert_relative_eq!(updated(&weight, &p, &l), expected, epsilon = 1e-10, max_relative = 1e-10);
+    }
 }

@@ -12,6 +12,10 @@ pub(super) const POSITION: usize = 6;
 /// Sums over the run of the position error, and of the moment of it about the trajectory's centre: the terms of the
 /// alignment.
 pub(super) const SUMS: usize = 9;
+/// Number of states that depend on the states of the epoch before, the first ones; the others only take up process noise.
+pub(super) const CHANGING: usize = GYRO_BIAS;
+/// Number of the other states.
+pub(super) const CONSTANT: usize = N - CHANGING;
 /// Biases.
 pub(super) const GYRO_BIAS: usize = 15;
 pub(super) const ACCEL_BIAS: usize = 18;
