@@ -66,12 +66,16 @@ impl Estimator {
     fn finish_oldest_segment(&mut self, tracking: &mut Tracking, linearised: Option<&Linearised>) -> Option<f64> {
         let Tracking { window, at_end, sensed, .. } = tracking;
         let local_map = &mut self.local_map;
-        *at_end = linearised.and_then(|at| window.sensitivity_at(window.nominal.end_s(), at, &local_map.views));
-        if !window.is_full() {
+        let end_s = window.nominal.end_s();
+        let Some(until_s) = window.next_start_s().filter(|_| window.is_full()) else {
+            [*at_end] = linearised.map_or([None], |at| window.sensitivities_at([end_s], at, &local_map.views));
             return None;
-        }
-        let until_s = window.next_start_s()?;
-        if let Some(by) = linearised.and_then(|at| window.sensitivity_at(until_s, at, &local_map.views)) {
+        };
+        let times_s = [end_s, until_s];
+        let sensitivities = linearised.map(|at| window.sensitivities_at(times_s, at, &local_map.views));
+        let [by_end, by_start] = sensitivities.unwrap_or([None, None]);
+        *at_end = by_end;
+        if let Some(by) = by_start {
             local_map.consider.advance(&by);
         }
         let tau_s = window.unknowns.clock.lidar_s(until_s);

@@ -9,10 +9,16 @@ pub(super) const SPAN_UNKNOWNS: usize = 24;
 #[inline(always)]
 pub(super) fn over_knots(by_motion: &[f64; 6], basis: &Basis) -> [f64; SPAN_UNKNOWNS] {
     let mut knots = [0.0; SPAN_UNKNOWNS];
-    for (knot, value) in knots.chunks_exact_mut(6).zip(basis.value) {
+    add_over_knots(&mut knots, by_motion, basis);
+    knots
+}
+
+/// Adds six derivatives by a surfel's motion, converted to derivatives by the four knots of the span, to `sums`.
+#[inline(always)]
+pub(super) fn add_over_knots(sums: &mut [f64; SPAN_UNKNOWNS], by_motion: &[f64; 6], basis: &Basis) {
+    for (knot, value) in sums.chunks_exact_mut(6).zip(basis.value) {
         add_scaled(knot, by_motion, value);
     }
-    knots
 }
 
 #[inline(always)]

@@ -119,6 +119,7 @@ impl<const B: usize> SurfelJacobian<B> {
 
 /// Adds the Jacobian row of a match, scaled by `scales[k]`, to column `k` of six; `side` are its derivatives by the motion of
 /// a surfel with the spline basis `basis`.
+#[inline(always)]
 pub(in crate::estimation) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,

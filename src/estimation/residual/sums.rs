@@ -3,7 +3,7 @@
 //! All surfels of a span depend on the same four knots. Their terms are summed in small dense blocks, which fit into
 //! the L1 cache, and enter the equations a block at a time.
 
-use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
+use super::knot_span::{SPAN_UNKNOWNS, add_over_knots, add_scaled, over_knots};
 use super::matched::SurfelJacobian;
 use super::{CLOCK, Layout};
 use crate::estimation::normal_equations::NormalEquations;
@@ -62,14 +62,17 @@ impl<const B: usize> SpanSums<B> {
     /// Adds the terms of a surfel; `basis` is the spline basis at the time of the surfel.
     #[inline(always)]
     pub(in crate::estimation) fn add(&mut self, own: &SurfelSums<B>, basis: &Basis) {
-        let square = own.square.map(|row| over_knots(&row, basis));
+        let mut square = [[0.0; SPAN_UNKNOWNS]; 6];
+        for (row, by_motion) in square.iter_mut().zip(&own.square) {
+            add_over_knots(row, by_motion, basis);
+        }
         for (knot, (rows, value)) in self.square.chunks_exact_mut(6).zip(basis.value).enumerate() {
             for (sums, row) in rows.iter_mut().zip(&square) {
                 add_scaled(&mut sums[..6 * (knot + 1)], row, value);
             }
         }
         for (sums, row) in self.by_border.iter_mut().zip(&own.common) {
-            add_scaled(sums, &over_knots(row, basis), 1.0);
+            add_over_knots(sums, row, basis);
         }
         add_scaled(&mut self.right, &over_knots(&own.right, basis), -1.0);
     }

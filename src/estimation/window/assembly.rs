@@ -40,10 +40,10 @@ impl Window {
     ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
         let Linearised { layout, scene, matches, robust, .. } = at;
-        self.assemble_inertial(first, layout, total);
-        let clock_reference_s = self.unknowns.clock.at_s;
+        let (clock_reference_s, extrinsics) = (self.unknowns.clock.at_s, self.spec.extrinsics.estimated);
         let weighted = WeightedMatches { scene, matches, robust, clock_reference_s, sign: 1.0 };
-        weighted.add_to(&mut self.workspace.equations, layout, self.spec.extrinsics.estimated);
+        let ((), sums) = rayon::join(|| self.assemble_inertial(first, layout, total), || weighted.sums(extrinsics));
+        sums.add_to(&mut self.workspace.equations, layout);
         timing.equations_s += watch.lap_s();
         let Workspace { equations, factor, bases } = &mut self.workspace;
         equations.factor(factor).ok()?;

@@ -129,12 +129,13 @@ impl Matches {
         }
         let span = |surfel: usize| scene[surfel].basis.first;
         let matched = (0..scene.len()).filter(|surfel| offsets[*surfel] < offsets[surfel + 1]);
-        let spans = Grouped::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
+        let spans = || Grouped::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
         let coupled = all.iter().enumerate().filter_map(|(index, one)| {
             let (a, b) = (span(one.a as usize), span(one.other()?));
             Some(((a.min(b), a.max(b)), index as u32))
         });
-        Self { spans, couplings: Grouped::of(coupled.collect()), all, of_surfels, offsets }
+        let (spans, couplings) = rayon::join(spans, || Grouped::of(coupled.collect()));
+        Self { spans, couplings, all, of_surfels, offsets }
     }
 
     /// The matches of a surfel of the scene: indices into `all`.

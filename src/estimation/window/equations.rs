@@ -84,28 +84,56 @@ pub(super) struct WeightedMatches<'a> {
     pub sign: f64,
 }
 
+/// The normal equations of all matches, summed by the knot spans of their surfels, in the order of the spans.
+pub(super) enum MatchSums {
+    WithExtrinsics(SumsBySpan<COMMON>),
+    WithoutExtrinsics(SumsBySpan<COMMON_WITHOUT_EXTRINSICS>),
+}
+
+/// Sums of spans, each with its first knot, and of pairs of spans.
+pub(super) struct SumsBySpan<const B: usize> {
+    spans: Vec<(i64, SpanSums<B>)>,
+    pairs: Vec<((i64, i64), Coupling)>,
+}
+
+impl MatchSums {
+    /// Adds the sums to the window's equations.
+    pub fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
+        match self {
+            Self::WithExtrinsics(sums) => sums.add_to(equations, layout),
+            Self::WithoutExtrinsics(sums) => sums.add_to(equations, layout),
+        }
+    }
+}
+
+impl<const B: usize> SumsBySpan<B> {
+    fn add_to(&self, equations: &mut NormalEquations, layout: &Layout) {
+        self.spans.iter().for_each(|(span, sum)| sum.add_to(equations, layout, *span));
+        self.pairs.iter().for_each(|((early, late), sum)| sum.add_to(equations, layout, *early, *late));
+    }
+}
+
 impl WeightedMatches<'_> {
-    /// Adds all matches; with `extrinsics`, including their derivatives by the lidar extrinsics.
-    pub fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, extrinsics: bool) {
+    /// The sums of all matches; with `extrinsics`, including their derivatives by the lidar extrinsics.
+    pub fn sums(&self, extrinsics: bool) -> MatchSums {
         let weigh = |one: &Match| self.sign * self.robust.weight(&one.plane, one.plane.distance_m);
         let weights: Vec<f64> = self.matches.all.iter().map(weigh).collect();
         if extrinsics {
-            self.add_weighted::<COMMON>(&weights, equations, layout);
+            MatchSums::WithExtrinsics(self.sums_by_span(&weights))
         } else {
-            self.add_weighted::<COMMON_WITHOUT_EXTRINSICS>(&weights, equations, layout);
+            MatchSums::WithoutExtrinsics(self.sums_by_span(&weights))
         }
     }
 
-    /// Sums run by run and adds the sums in order. The result has the same bits for any number of threads, and on all
-    /// machines, because vector units of any width add in the same order.
-    fn add_weighted<const B: usize>(&self, weights: &[f64], equations: &mut NormalEquations, layout: &Layout) {
+    /// Sums run by run. The result has the same bits for any number of threads, and on all machines, because vector units
+    /// of any width add in the same order.
+    fn sums_by_span<const B: usize>(&self, weights: &[f64]) -> SumsBySpan<B> {
         let spans = self.matches.spans.par_iter();
         let spans = spans.map(|(span, surfels)| (span, Arch::new().dispatch(|| self.of_span::<B>(surfels, weights))));
         let pairs = self.matches.couplings.par_iter();
         let pairs = pairs.map(|(pair, matches)| (pair, Arch::new().dispatch(|| self.coupling::<B>(matches, weights))));
-        let (spans, pairs): (Vec<_>, Vec<_>) = rayon::join(|| spans.collect(), || pairs.collect());
-        spans.iter().for_each(|(span, sum)| sum.add_to(equations, layout, *span));
-        pairs.iter().for_each(|((early, late), sum)| sum.add_to(equations, layout, *early, *late));
+        let (spans, pairs) = rayon::join(|| spans.collect(), || pairs.collect());
+        SumsBySpan { spans, pairs }
     }
 
     /// The normal equations of all matches of the surfels of a span, by the motion of each surfel.

@@ -42,7 +42,7 @@ impl Window {
         let clock_reference_s = self.unknowns.clock.at_s;
         let views =
             WeightedMatches { scene: &at.scene, matches: &matches, robust: &at.robust, clock_reference_s, sign: -1.0 };
-        views.add_to(&mut self.workspace.equations, &at.layout, self.spec.extrinsics.estimated);
+        views.sums(self.spec.extrinsics.estimated).add_to(&mut self.workspace.equations, &at.layout);
         let (total, moved) = (&at.total_before, self.border.total_step());
         let equations = &mut self.workspace.equations;
         self.start.remove_velocity(equations, &at.layout, total, moved, self.spec.knot_spacing_s);

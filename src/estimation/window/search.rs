@@ -55,19 +55,27 @@ impl Window {
             let patch = &scene[a as usize].patch;
             self.matcher.pass_gates(patch, other, gate_m).then(|| Plane::of(patch, other, sigma_m))
         };
-        let live = |(a, b): &(u32, u32)| {
-            let plane = plane(*a, &scene[*b as usize].patch)?;
-            Some(Match { a: *a, with: Counterpart::Live(*b), plane })
-        };
-        let fixed = |(a, view, patch): &(u32, u32, u32)| {
-            let (other, sighting) = views.view(*view as usize).patch(*patch, &self.unknowns.lidar);
-            let plane = plane(*a, &other)?;
-            Some(Match { a: *a, with: Counterpart::Fixed { view: *view, patch: *patch, sighting }, plane })
-        };
         // By chunks: most candidates fail a gate, and are not stored.
-        let mut all: Vec<Match> =
-            neighbours.pairs.par_chunks(CANDIDATES).flat_map_iter(|pairs| pairs.iter().filter_map(live)).collect();
-        all.par_extend(neighbours.fixed.par_chunks(CANDIDATES).flat_map_iter(|pairs| pairs.iter().filter_map(fixed)));
+        let live = |pairs: &[(u32, u32)]| {
+            let mut found = Vec::new();
+            for (a, b) in pairs {
+                let plane = plane(*a, &scene[*b as usize].patch);
+                found.extend(plane.map(|plane| Match { a: *a, with: Counterpart::Live(*b), plane }));
+            }
+            found
+        };
+        let fixed = |candidates: &[(u32, u32, u32)]| {
+            let mut found = Vec::new();
+            for (a, view, patch) in candidates {
+                let (other, sighting) = views.view(*view as usize).patch(*patch, &self.unknowns.lidar);
+                let with = Counterpart::Fixed { view: *view, patch: *patch, sighting };
+                found.extend(plane(*a, &other).map(|plane| Match { a: *a, with, plane }));
+            }
+            found
+        };
+        let live = neighbours.pairs.par_chunks(CANDIDATES).map(live);
+        let found: Vec<Vec<Match>> = live.chain(neighbours.fixed.par_chunks(CANDIDATES).map(fixed)).collect();
+        let all = found.concat();
         Matches::of(all, scene)
     }
 

@@ -11,15 +11,29 @@ use crate::estimation::spline::Basis;
 use crate::estimation::views::Views;
 use crate::geometry::Vector;
 use nalgebra::{Matrix6, SMatrix};
+use pulp::Arch;
+use rayon::prelude::*;
+
+/// Number of a view, and a column of the right-hand side for each component of its error.
+type ViewColumns = (u64, [Vec<f64>; 6]);
 
 impl Window {
-    /// Sensitivity of the states at `u_s`, trajectory time, to the quantities that this window assumes fixed.
-    pub(in crate::estimation) fn sensitivity_at(
+    /// Sensitivities of the states at `times_s`, trajectory time, to the quantities that this window assumes fixed.
+    pub(in crate::estimation) fn sensitivities_at<const T: usize>(
         &self,
-        u_s: f64,
+        times_s: [f64; T],
         at: &Linearised,
         views: &Views,
-    ) -> Option<Sensitivity> {
+    ) -> [Option<Sensitivity>; T] {
+        let by_views = Arch::new().dispatch(|| self.columns_of_views(at, views));
+        let mut found = [const { None }; T];
+        let of_times = found.par_iter_mut().zip(times_s);
+        of_times.for_each(|(found, u_s)| *found = self.sensitivity_at(u_s, at, &by_views));
+        found
+    }
+
+    /// Sensitivity of the states at `u_s`; `by_views` as from [`Self::columns_of_views`].
+    fn sensitivity_at(&self, u_s: f64, at: &Linearised, by_views: &[ViewColumns]) -> Option<Sensitivity> {
         let size = at.layout.size();
         let inherited = self.columns_at(u_s, &at.layout);
         // H^-1 is symmetric: the solutions for these rows serve all fixed quantities.
@@ -35,7 +49,6 @@ impl Window {
         // The remainder of the covariance after subtraction of the start's part, which `ConsiderCovariance` propagates.
         let all = StartMatrix::from_fn(|r, c| by(r, &inherited[c]));
         let own = all - start * self.known_at_start()? * start.transpose();
-        let by_views = self.columns_of_views(at, views);
         Some(Sensitivity {
             pivot: self.nominal.at(u_s, &self.unknowns.biases.gyro).position,
             start,
@@ -110,7 +123,8 @@ impl Window {
     }
 
     /// Change of the right-hand side per unit rotation about the pivot and translation of each view in use.
-    fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<(u64, [Vec<f64>; 6])> {
+    #[inline(always)]
+    fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<ViewColumns> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
         for Match { a, with, plane } in &at.matches.all {
             let Counterpart::Fixed { view: index, sighting, .. } = *with else { continue };
