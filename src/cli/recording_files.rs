@@ -7,69 +7,110 @@ use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A recording and, unless it has none, the true trajectory next to it, as files that only this process has created.
+/// A file next to a recording, with the same name and another ending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Companion {
+    /// True trajectory.
+    Truth,
+    /// Layout of Foxglove.
+    Layout,
+    /// The head as URDF.
+    HeadModel,
+}
+
+impl Companion {
+    const ALL: [Self; 3] = [Self::Truth, Self::Layout, Self::HeadModel];
+
+    fn of(self, recording: &Path) -> PathBuf {
+        recording.with_extension(match self {
+            Self::Truth => "tum",
+            Self::Layout => "foxglove.json",
+            Self::HeadModel => "urdf",
+        })
+    }
+}
+
+/// A recording with the files next to it, as files that only this process has created.
 ///
 /// Files that exist are replaced only by [`finish`](Self::finish): until then the new files have temporary names, so
 /// that a failed run destroys no file.
 pub(super) struct RecordingFiles {
     recording: PathBuf,
-    truth: Option<PathBuf>,
+    companions: Vec<Companion>,
     /// Final path of the complete recording, if it is written under a temporary name.
     replaces: Option<PathBuf>,
     is_finished: bool,
 }
 
 impl RecordingFiles {
-    /// Reserves `wanted` and, with `truth`, the file of the same name that ends in `.tum`. Where one of them exists a number is
-    /// added to both names, unless `force` permits to replace them. No file of `inputs` is ever replaced.
+    /// Reserves `wanted` and its `companions`. Where a file of these names exists a number is added to all names, unless `force`
+    /// permits to replace them. No file of `inputs` is ever replaced.
     ///
     /// # Errors
-    /// When the two files would be one, an input would be replaced, or they cannot be created.
-    pub fn reserve(wanted: &Path, truth: bool, force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
-        if wanted.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("tum")) {
+    /// When two of the files would be one, an input would be replaced, or they cannot be created.
+    pub fn reserve(wanted: &Path, companions: &[Companion], force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
+        if let Some(same) = Companion::ALL.iter().find(|companion| is_same_name(&companion.of(wanted), wanted)) {
             let message = format!(
-                "--out {}: the recording needs another ending, such as .mcap; the true trajectory is written next to it \
-                 as .tum",
-                wanted.display()
+                "--out {}: the recording needs another ending, such as .mcap; {} is written next to it",
+                wanted.display(),
+                same.of(wanted).display()
             );
             return Err(Usage(message).into());
         }
         create_parent(wanted)?;
-        let outputs: Vec<PathBuf> = [wanted.to_owned()].into_iter().chain(truth.then(|| truth_of(wanted))).collect();
+        let outputs: Vec<PathBuf> =
+            [wanted.to_owned()].into_iter().chain(Companion::ALL.map(|companion| companion.of(wanted))).collect();
         if !(force && outputs.iter().any(|path| path.exists())) {
-            return Self::first_free(wanted, truth, None);
+            return Self::first_free(wanted, companions, None);
         }
+        let truth = Companion::Truth.of(wanted);
         ensure!(
-            truth || !truth_of(wanted).exists(),
+            companions.contains(&Companion::Truth) || !truth.exists(),
             "{} next to it is the true trajectory of another recording: choose another --out",
-            truth_of(wanted).display()
+            truth.display()
         );
         for path in &outputs {
             ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
         }
         check_not_inputs(inputs, &outputs)?;
         let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
-        Self::first_free(&wanted.with_extension(format!("partial{ending}")), truth, Some(wanted))
+        Self::first_free(&wanted.with_extension(format!("partial{ending}")), companions, Some(wanted))
     }
 
-    /// Creates the files under the first name, `wanted` or `wanted` with a number, that neither a recording nor a true
-    /// trajectory has taken.
+    /// Creates the files under the first name, `wanted` or `wanted` with a number, of which no file exists.
     ///
     /// [`finish`](Self::finish) then moves them to `replaces`, if given.
-    fn first_free(wanted: &Path, truth: bool, replaces: Option<&Path>) -> anyhow::Result<Self> {
+    fn first_free(wanted: &Path, companions: &[Companion], replaces: Option<&Path>) -> anyhow::Result<Self> {
         for recording in candidates(wanted) {
-            let truth_file = truth_of(&recording);
             if !is_created(&recording)? {
                 continue;
             }
-            let is_free = if truth { is_created(&truth_file)? } else { !truth_file.exists() };
-            if is_free {
-                let (truth, replaces) = (truth.then_some(truth_file), replaces.map(Path::to_owned));
-                return Ok(Self { recording, truth, replaces, is_finished: false });
+            // Dropped, it removes what it has created.
+            let mut files =
+                Self { recording, companions: vec![], replaces: replaces.map(Path::to_owned), is_finished: false };
+            if files.reserves_all(companions)? {
+                return Ok(files);
             }
-            std::fs::remove_file(&recording).with_context(|| format!("{} cannot be removed", recording.display()))?;
         }
         bail!("{} and thousands of numbered files exist already", wanted.display());
+    }
+
+    /// Creates the files next to the recording; `false` if a file of such a name exists, also one that is not written.
+    fn reserves_all(&mut self, companions: &[Companion]) -> anyhow::Result<bool> {
+        for companion in Companion::ALL {
+            let path = companion.of(&self.recording);
+            if !companions.contains(&companion) {
+                if path.exists() {
+                    return Ok(false);
+                }
+                continue;
+            }
+            if !is_created(&path)? {
+                return Ok(false);
+            }
+            self.companions.push(companion);
+        }
+        Ok(true)
     }
 
     /// Where the recording is written.
@@ -77,37 +118,59 @@ impl RecordingFiles {
         &self.recording
     }
 
-    /// Where the true trajectory is written, if it is.
-    pub fn truth(&self) -> Option<&Path> {
-        self.truth.as_deref()
+    /// Where a file next to the recording is written, if it is.
+    pub fn companion(&self, companion: Companion) -> Option<PathBuf> {
+        self.companions.contains(&companion).then(|| companion.of(&self.recording))
     }
 
-    /// Moves the complete files to the names that they replace; returns the final names.
+    /// Moves the complete files to the names that they replace, and removes an old model of another head; returns the final names
+    /// of the recording and of the true trajectory.
     ///
     /// # Errors
     /// When they cannot be moved.
     pub fn finish(mut self) -> anyhow::Result<(PathBuf, Option<PathBuf>)> {
         self.is_finished = true;
-        let Some(wanted) = self.replaces.take() else { return Ok((self.recording.clone(), self.truth.clone())) };
-        let truth = self.truth.as_ref().map(|from| (from, truth_of(&wanted)));
-        for (from, to) in truth.iter().map(|(from, to)| (*from, to)).chain([(&self.recording, &wanted)]) {
-            std::fs::rename(from, to)
-                .with_context(|| format!("{} cannot be moved to {}", from.display(), to.display()))?;
+        let recording = self.replaces.take().unwrap_or_else(|| self.recording.clone());
+        let truth = self.companions.contains(&Companion::Truth).then(|| Companion::Truth.of(&recording));
+        if recording == self.recording {
+            return Ok((recording, truth));
         }
-        Ok((wanted.clone(), truth.map(|(_, truth)| truth)))
+        for companion in Companion::ALL {
+            let (from, to) = (companion.of(&self.recording), companion.of(&recording));
+            if self.companions.contains(&companion) {
+                replace(&from, &to)?;
+            } else if to.exists() {
+                std::fs::remove_file(&to).with_context(|| format!("{} cannot be removed", to.display()))?;
+            }
+        }
+        replace(&self.recording, &recording)?;
+        Ok((recording, truth))
     }
 }
 
 impl Drop for RecordingFiles {
     /// Removes the files of a run that failed before it wrote anything.
     fn drop(&mut self) {
-        for path in [&self.recording].into_iter().chain(&self.truth).filter(|_| !self.is_finished) {
-            if std::fs::metadata(path).is_ok_and(|file| file.len() == 0) {
+        if self.is_finished {
+            return;
+        }
+        let companions = self.companions.iter().map(|companion| companion.of(&self.recording));
+        for path in companions.chain([self.recording.clone()]) {
+            if std::fs::metadata(&path).is_ok_and(|file| file.len() == 0) {
                 // A file that cannot be removed is empty and harmless.
                 let _ = std::fs::remove_file(path);
             }
         }
     }
+}
+
+/// Whether two paths in one folder name one file, also where case does not matter.
+fn is_same_name(a: &Path, b: &Path) -> bool {
+    a.to_string_lossy().eq_ignore_ascii_case(&b.to_string_lossy())
+}
+
+fn replace(from: &Path, to: &Path) -> anyhow::Result<()> {
+    std::fs::rename(from, to).with_context(|| format!("{} cannot be moved to {}", from.display(), to.display()))
 }
 
 /// Creates an empty file; `false` if the name exists, even as a dangling link.
@@ -119,51 +182,53 @@ fn is_created(path: &Path) -> anyhow::Result<bool> {
     }
 }
 
-fn truth_of(recording: &Path) -> PathBuf {
-    recording.with_extension("tum")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const ALL: &[Companion] = &Companion::ALL;
+
     #[test]
-    fn neither_file_replaces_one_that_exists() {
+    fn no_file_replaces_one_that_exists() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("run.mcap");
         std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
-        let first = RecordingFiles::reserve(&wanted, true, false, &[]).unwrap();
-        let second = RecordingFiles::reserve(&wanted, true, false, &[]).unwrap();
+        std::fs::write(here.path().join("run-3.urdf"), "foreign").unwrap();
+        let first = RecordingFiles::reserve(&wanted, ALL, false, &[]).unwrap();
+        let second = RecordingFiles::reserve(&wanted, &[Companion::Truth], false, &[]).unwrap();
         assert_eq!(first.recording(), here.path().join("run-2.mcap"));
-        assert_eq!(second.recording(), here.path().join("run-3.mcap"));
-        assert_eq!(second.truth(), Some(here.path().join("run-3.tum").as_path()));
+        assert_eq!(first.companion(Companion::Layout), Some(here.path().join("run-2.foxglove.json")));
+        assert_eq!(second.recording(), here.path().join("run-4.mcap"), "the foreign model would seem to be of it");
+        assert_eq!(second.companion(Companion::Truth), Some(here.path().join("run-4.tum")));
         drop((first, second));
-        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 1, "empty files are removed");
-        let without_truth = RecordingFiles::reserve(&wanted, false, false, &[]).unwrap();
-        assert_eq!(
-            (without_truth.recording(), without_truth.truth()),
-            (here.path().join("run-2.mcap").as_path(), None)
-        );
+        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 2, "empty files are removed");
+        let without_truth = RecordingFiles::reserve(&wanted, &[], false, &[]).unwrap();
+        assert_eq!(without_truth.recording(), here.path().join("run-2.mcap"));
+        assert_eq!(without_truth.companion(Companion::Truth), None);
         std::fs::write(&wanted, "old").unwrap();
-        assert!(RecordingFiles::reserve(&wanted, false, true, &[]).is_err(), "the truth next to it is another's");
-        assert!(RecordingFiles::reserve(&here.path().join("y.tum"), true, true, &[]).is_err());
-        assert!(RecordingFiles::reserve(Path::new(""), true, false, &[]).is_err());
+        assert!(RecordingFiles::reserve(&wanted, &[], true, &[]).is_err(), "the truth next to it is another's");
+        for name in ["y.tum", "y.TUM", "y.urdf"] {
+            assert!(RecordingFiles::reserve(&here.path().join(name), ALL, true, &[]).is_err());
+        }
+        assert!(RecordingFiles::reserve(Path::new(""), ALL, true, &[]).is_err());
     }
 
     #[test]
     fn with_force_the_old_files_last_until_the_new_ones_are_complete() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("run.mcap");
-        let old = here.path().join("run.tum");
+        let (old, model) = (here.path().join("run.tum"), here.path().join("run.urdf"));
         std::fs::write(&old, "old").unwrap();
-        let files = RecordingFiles::reserve(&wanted, true, true, &[]).unwrap();
+        std::fs::write(&model, "another head").unwrap();
+        let files = RecordingFiles::reserve(&wanted, &[Companion::Truth, Companion::Layout], true, &[]).unwrap();
         std::fs::write(files.recording(), "new recording").unwrap();
-        std::fs::write(files.truth().unwrap(), "new").unwrap();
+        std::fs::write(files.companion(Companion::Truth).unwrap(), "new").unwrap();
         assert_eq!(std::fs::read_to_string(&old).unwrap(), "old");
         assert_eq!(files.finish().unwrap(), (wanted.clone(), Some(old.clone())));
         assert_eq!(std::fs::read_to_string(&old).unwrap(), "new");
-        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 2);
-        let error = RecordingFiles::reserve(&wanted, true, true, &[old]).err().unwrap();
+        assert!(!model.exists(), "the new head has no model");
+        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3);
+        let error = RecordingFiles::reserve(&wanted, ALL, true, &[old]).err().unwrap();
         assert!(error.to_string().contains("would be replaced"), "{error}");
     }
 }

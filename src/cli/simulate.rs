@@ -3,17 +3,18 @@
 use super::Completion;
 use super::arguments::{Global, ScenarioArguments};
 use super::bars::{Bars, stop_flag};
-use super::recording_files::RecordingFiles;
+use super::recording_files::{Companion, RecordingFiles};
 use super::{output, recording_size};
+use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim::recording::write_rosbag2_metadata;
 use zsim::report;
 use zsim::simulation::{Outputs, Simulation, SimulationSummary};
-use zsim::study::{self, ProgressMonitor};
+use zsim::study::{self, ProgressMonitor, ViewerFiles};
 
-/// Simulate and record: an MCAP file with the truth inside, and the true trajectory next to it as a TUM file
+/// Simulate and record: an MCAP file with the truth inside, and next to it the true trajectory and files for viewers
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim simulate --scene office --duration 2min --out office.mcap\n  zsim simulate --scene \
@@ -26,13 +27,14 @@ pub(super) struct Arguments {
     scene: String,
     #[command(flatten)]
     scenario: ScenarioArguments,
-    /// The recording; if it or the .tum file next to it exists, a number is added to both names [default: <scene>.mcap]
+    /// The recording; next to it: .tum, the true trajectory; .foxglove.json, a layout of Foxglove; .urdf, the head on its spring. If
+    /// one of these exists, a number is added to all names [default: <scene>.mcap]
     #[arg(long, short, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
     /// Write the recording into this new folder as rosbag2 does, with metadata.yaml, for `ros2 bag play DIR`
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force"])]
     rosbag2: Option<PathBuf>,
-    /// Replace the recording and the .tum file, once the new ones are complete
+    /// Replace the recording and the files of its name next to it, once the new ones are complete
     #[arg(long)]
     force: bool,
     /// Show the true head in /tf, for looking; an estimate of one's own would contradict it
@@ -55,18 +57,21 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut bars = Bars::new(global);
     let outputs = if arguments.imu_only { Outputs::Imus } else { Outputs::All };
     recording_size::check(&simulation, outputs, &wanted, |note| bars.note(note))?;
-    let files = RecordingFiles::reserve(&wanted, !arguments.imu_only, arguments.force, &inputs)?;
+    let viewers = (!arguments.imu_only).then(|| ViewerFiles::of(&simulation));
+    let files = RecordingFiles::reserve(&wanted, &companions(viewers.as_ref()), arguments.force, &inputs)?;
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
-    let recorded = match files.truth() {
-        Some(truth) => study::record(&simulation, files.recording(), truth, arguments.truth_tf, &mut watch),
+    let recorded = match files.companion(Companion::Truth) {
+        Some(truth) => study::record(&simulation, files.recording(), &truth, arguments.truth_tf, &mut watch),
         None => study::record_imus(&simulation, files.recording(), &mut watch),
     };
     bars.finish();
     let summary = recorded.inspect_err(|_| super::full_run::print_partial_results(files.recording()))?;
+    if let Some(viewers) = &viewers {
+        write_for_viewers(viewers, &files)?;
+    }
     let (recording, truth) = files.finish()?;
-
     if folder.is_some() {
         write_rosbag2_metadata(&recording)?;
     }
@@ -78,6 +83,22 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
     output::print_result(global, &text(&summary, outputs), figures, Some(folder.as_deref().unwrap_or(&recording)))?;
     Ok(Completion::Done)
+}
+
+/// The files next to a recording; one of the IMU alone has none.
+fn companions(viewers: Option<&ViewerFiles>) -> Vec<Companion> {
+    let Some(viewers) = viewers else { return Vec::new() };
+    let head_model = viewers.head_model.as_ref().map(|_| Companion::HeadModel);
+    [Companion::Truth, Companion::Layout].into_iter().chain(head_model).collect()
+}
+
+/// Writes the layout and the model of the head.
+fn write_for_viewers(viewers: &ViewerFiles, files: &RecordingFiles) -> anyhow::Result<()> {
+    let contents = [(Companion::Layout, Some(viewers.layout)), (Companion::HeadModel, viewers.head_model.as_deref())];
+    for (path, text) in contents.into_iter().filter_map(|(of, text)| files.companion(of).zip(text)) {
+        std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(())
 }
 
 /// Name of the file in a folder of rosbag2: that of the folder, with the number 0.

@@ -5,7 +5,7 @@ use super::estimate::estimate_in;
 use super::origin::Origin;
 use super::result_files::{full_run_files, remove};
 use super::sensor_models::RecordedSensors;
-use super::viewer_files::write_for_recording;
+use super::viewer_files::ViewerFiles;
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, StudyError, record};
 use crate::recording::{Reader, TopicPreference};
 use crate::simulation::Simulation;
@@ -30,7 +30,7 @@ pub fn simulate_and_estimate(
     manifest.write(&folder.join("manifest.ron"))?;
 
     let recording = folder.join("recording.mcap");
-    write_for_recording(folder, simulation)?;
+    ViewerFiles::of(simulation).write(folder)?;
     let summary = record(simulation, &recording, &folder.join("truth.tum"), false, watch)?;
 
     // The estimator gets its input only from the file. The truth in it is read only for the evaluation.

