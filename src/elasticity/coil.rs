@@ -39,6 +39,13 @@ pub struct Coil {
     restitution: f64,
 }
 
+/// Spring indices for which the force law is valid.
+const INDEX: [f64; 2] = [4.0, 20.0];
+/// Pitch angles without load for which the force law is valid, degrees.
+const PITCH_DEG: [f64; 2] = [0.0, 15.0];
+/// Relative tolerance at the ends of the range: 4 mm over 1 mm is in it.
+const RANGE_ROUNDING: f64 = 1e-9;
+
 impl Coil {
     /// Creates a coil with mean diameter `coil_diameter_m` and `active_coils` turns of wire, right-handed, which begin on +x.
     ///
@@ -95,6 +102,28 @@ impl Coil {
     /// How the wire winds.
     pub fn winding(&self) -> &Winding {
         &self.winding
+    }
+
+    /// Checks that the force law is valid for the coil: within the range that is compared with an exact rod in
+    /// `tests/dynamics/rod.rs`.
+    ///
+    /// # Errors
+    /// When the index or the pitch is outside.
+    pub fn check_range(&self) -> Result<(), ElasticityError> {
+        let index = self.coil_diameter_m / self.wire_diameter_m;
+        let pitch_deg = self.free_length_m.atan2(std::f64::consts::PI * self.coil_diameter_m * self.active_coils);
+        let pitch_deg = pitch_deg.to_degrees();
+        let quantities = [
+            ("index (mean coil diameter over wire diameter)", index, INDEX),
+            ("pitch angle in degrees", pitch_deg, PITCH_DEG),
+        ];
+        let is_outside = |(_, value, [low, high]): &(&str, f64, [f64; 2])| {
+            *value < low * (1.0 - RANGE_ROUNDING) || *value > high * (1.0 + RANGE_ROUNDING)
+        };
+        match quantities.into_iter().find(is_outside) {
+            None => Ok(()),
+            Some((quantity, value, range)) => Err(ElasticityError::OutsideRange { quantity, value, range }),
+        }
     }
 
     /// Length of the wire of one turn, without load, m.
@@ -182,6 +211,24 @@ mod tests {
     fn a_wire_thicker_than_half_its_coil_is_refused() {
         let error = Coil::new(0.025, 0.015, 2.0, 0.12, STEEL).unwrap_err();
         assert!(error.to_string().contains("index, is 1.67"), "{error}");
+    }
+
+    #[test]
+    fn the_range_of_the_force_law_ends_at_an_index_of_4_and_20_and_a_pitch_of_15_degrees() {
+        let checked = |coil_m: f64, wire_m: f64, coils: f64, length_m: f64| {
+            Coil::new(coil_m, wire_m, coils, length_m, STEEL).unwrap().check_range().map_err(|error| error.to_string())
+        };
+        assert_eq!(checked(0.012, 0.003, 4.0, 0.03), Ok(()));
+        assert_eq!(checked(0.06, 0.003, 4.0, 0.03), Ok(()));
+        assert!(
+            checked(0.0119, 0.003, 4.0, 0.03).unwrap_err().contains("index (mean coil diameter over wire diameter)")
+        );
+        assert!(checked(0.0601, 0.003, 4.0, 0.03).unwrap_err().contains("valid from 4 to 20"));
+        // tan(15 degrees) pi 25 mm = 21.04 mm per coil.
+        assert_eq!(checked(0.025, 0.003, 5.0, 0.1052), Ok(()));
+        assert!(
+            checked(0.025, 0.003, 5.0, 0.1053).unwrap_err().contains("pitch angle in degrees of the spring is 15.0")
+        );
     }
 
     #[test]

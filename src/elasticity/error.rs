@@ -17,6 +17,21 @@ pub enum ElasticityError {
         /// Spring index: coil diameter over wire diameter.
         index: f64,
     },
+    /// The spring is outside of the range in which the force law was compared with an exact rod.
+    #[error(
+        "the {quantity} of the spring is {value:.1}; the force law is valid from {} to {}: choose another coil or wire, or \
+         give the spring by `stiffness(...)`",
+        range[0],
+        range[1]
+    )]
+    OutsideRange {
+        /// What is outside, with its unit.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// Lowest and highest valid value.
+        range: [f64; 2],
+    },
     /// The coils touch without load.
     #[error(
         "the solid length of {coils} coils of {wire_mm} mm wire is {solid_mm:.2} mm; it must be less than the free length of {free_mm} mm"

@@ -173,7 +173,8 @@ impl SpringSpec {
     /// The validated spring; a coil without its rigid ends.
     ///
     /// # Errors
-    /// When there is no spring of that name, the file is invalid or names another spring, or a value is invalid.
+    /// When there is no spring of that name, the file is invalid or names another spring, a value is invalid, or the force law is
+    /// not valid for the coil.
     pub fn design(&self) -> Result<SpringDesign, ElasticityError> {
         match self {
             SpringSpec::Named(_) => self.resolved()?.design(),
@@ -191,6 +192,7 @@ impl SpringSpec {
                 let (diameter_m, wire_m) = (coil_diameter_mm * 1e-3, wire_diameter_mm * 1e-3);
                 let active_m = free_length_mm * 1e-3 - ends.wire_diameters() * wire_m;
                 let coil = Coil::new(diameter_m, wire_m, *active_coils, active_m, material.moduli())?;
+                coil.check_range()?;
                 let winding = Winding { left_handed: *hand == HandSpec::Left, start_rad: start_deg.to_radians() };
                 Ok(SpringDesign::Coil(coil.wound(winding).with_restitution(*coil_restitution)))
             }

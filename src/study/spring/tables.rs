@@ -8,6 +8,9 @@ use crate::report::page::PageTable;
 /// Names of the six directions of a stiffness matrix or a mode shape.
 const DIRECTIONS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
+/// Buckling load over the load, down to which the force law was compared with an exact rod.
+const VALID_BUCKLING_MARGIN: f64 = 1.25;
+
 /// A value of a report with its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Property {
@@ -94,7 +97,10 @@ fn bearing(bearing: &ElementLoad) -> Property {
 fn coil(coil: &CoilReport) -> Vec<Property> {
     let or_dash = |x: Option<f64>, unit: &str| x.map_or("-".to_owned(), |x| format!("{x:.1} {unit}"));
     let buckles = match (coil.buckling_load_n, coil.buckling_margin) {
-        (Some(load_n), Some(margin)) => format!("{load_n:.1} N, {margin:.1} x the load (top cannot tilt)"),
+        (Some(load_n), Some(margin)) => {
+            let beyond = if margin < VALID_BUCKLING_MARGIN { "; the force law is valid up to 80 % of it" } else { "" };
+            format!("{load_n:.1} N, {margin:.1} x the load (top cannot tilt){beyond}")
+        }
         _ if coil.load_n < 0.0 => "none: the head pulls the spring".to_owned(),
         _ => "does not buckle (top cannot tilt)".to_owned(),
     };
