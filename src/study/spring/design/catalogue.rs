@@ -8,25 +8,26 @@ use std::path::Path;
 /// The built-in catalogue: `specs/springs/catalogue.csv`.
 pub const STOCK: &str = include_str!("../../../../specs/springs/catalogue.csv");
 
-/// A quantity of a spring, and the names of its column. Lengths are in mm.
-const NAME: [&str; 5] = ["name", "part", "part_number", "article", "order_number"];
-const MEAN_DIAMETER: [&str; 4] = ["coil_diameter_mm", "mean_diameter_mm", "mean_diameter", "dm"];
-const OUTER_DIAMETER: [&str; 5] = ["outer_diameter_mm", "outer_diameter", "outside_diameter", "od", "de"];
-const INNER_DIAMETER: [&str; 5] = ["inner_diameter_mm", "inner_diameter", "inside_diameter", "id", "di"];
-const WIRE_DIAMETER: [&str; 3] = ["wire_diameter_mm", "wire_diameter", "wire"];
-const ACTIVE_COILS: [&str; 2] = ["active_coils", "active"];
-const TOTAL_COILS: [&str; 3] = ["total_coils", "coils", "nt"];
-const FREE_LENGTH: [&str; 3] = ["free_length_mm", "free_length", "l0"];
-const ENDS: [&str; 2] = ["ends", "end_type"];
-const MATERIAL: [&str; 2] = ["material", "wire_material"];
+/// The names of the column of each quantity, without a unit; lengths are in mm. A single letter is not another case of itself:
+/// `D` and `d` are the mean and the wire diameter of EN 13906-1.
+const NAME: &[&str] = &["name", "part", "part_number", "part_no", "article", "article_number", "order_number", "sku"];
+const MEAN_DIAMETER: &[&str] = &["coil_diameter", "mean_diameter", "mean_coil_diameter", "dm", "D"];
+const OUTER_DIAMETER: &[&str] = &["outer_diameter", "outside_diameter", "od", "de"];
+const INNER_DIAMETER: &[&str] = &["inner_diameter", "inside_diameter", "id", "di"];
+const WIRE_DIAMETER: &[&str] = &["wire_diameter", "wire", "wire_size", "wire_d", "d"];
+const ACTIVE_COILS: &[&str] = &["active_coils", "active", "n"];
+const TOTAL_COILS: &[&str] = &["total_coils", "coils", "nt"];
+const FREE_LENGTH: &[&str] = &["free_length", "l0", "L0"];
+const ENDS: &[&str] = &["ends", "end_type", "end"];
+const MATERIAL: &[&str] = &["material", "wire_material"];
 
 /// Reads the catalogue that the spec `referring` calls `name`: a CSV file, in the folder of `referring` or in the current
 /// one, or `"stock"` for the built-in one.
 ///
 /// The columns are found by their names, in any order and case, between commas, semicolons or tabs; others are ignored.
-/// Needed are the wire diameter, one of mean, outer and inner diameter, active or total coils, and the free length. A
-/// name, ends (`open`, `closed`, `closed_ground`, or `active_only` for a free length without ends) and material are
-/// optional; defaults: the line number, `active_only`, `spring_steel`.
+/// Needed are the wire diameter, one of mean, outer and inner diameter, active coils, or total coils with ends, and the free
+/// length. A name, ends (`open`, `closed`, `closed_ground`, or `active_only` for a free length without ends) and material are
+/// optional; defaults: the line number, `active_only` for active coils, `spring_steel`.
 ///
 /// # Errors
 /// When the file cannot be read, a column is missing or a line is invalid; the error has the line number.
@@ -56,23 +57,27 @@ struct Columns {
 impl Columns {
     fn of(header: &str) -> Result<Self, String> {
         let separator = [';', '\t'].into_iter().find(|c| header.contains(*c)).unwrap_or(',');
-        let names =
-            header.split(separator).map(|name| unquoted(name).to_lowercase().replace([' ', '-'], "_")).collect();
-        let columns = Self { separator, names };
+        let names: Vec<&str> = header.split(separator).map(unquoted).collect();
+        if let Some(name) = names.iter().find(|name| is_in_inches(name)) {
+            return Err(format!("the column \"{name}\" is in inches; lengths must be in mm"));
+        }
+        let columns = Self { separator, names: names.into_iter().map(normalised).collect() };
         let has = |names: &[&str]| columns.index(names).is_some();
+        let (diameters, coils) =
+            ([MEAN_DIAMETER, OUTER_DIAMETER, INNER_DIAMETER].concat(), [ACTIVE_COILS, TOTAL_COILS].concat());
         let needed = [
-            ("wire_diameter_mm", has(&WIRE_DIAMETER)),
-            (
-                "coil_diameter_mm, outer_diameter_mm or inner_diameter_mm",
-                has(&MEAN_DIAMETER) || has(&OUTER_DIAMETER) || has(&INNER_DIAMETER),
-            ),
-            ("active_coils or total_coils", has(&ACTIVE_COILS) || has(&TOTAL_COILS)),
-            ("free_length_mm", has(&FREE_LENGTH)),
+            ("wire diameter", WIRE_DIAMETER),
+            ("coil diameter", &diameters),
+            ("coils", &coils),
+            ("free length", FREE_LENGTH),
         ];
-        match needed.into_iter().find(|(_, is_there)| !is_there) {
+        match needed.into_iter().find(|(_, names)| !has(names)) {
             None => Ok(columns),
-            Some((missing, _)) => {
-                Err(format!("the first line of a spring catalogue must name a column {missing}; it is \"{header}\""))
+            Some((missing, names)) => {
+                let names = names.join(", ");
+                Err(format!(
+                    "a spring catalogue needs a column for the {missing}, named {names}; its first line is \"{header}\""
+                ))
             }
         }
     }
@@ -88,20 +93,27 @@ impl Columns {
         }
         let text = |names: &[&str]| self.index(names).map(|k| fields[k]).filter(|field| !field.is_empty());
         let number = |names: &[&str]| text(names).map(|field| self.number(field)).transpose();
+        let (active, total) = (number(ACTIVE_COILS)?, number(TOTAL_COILS)?);
+        let needs_ends = active.is_none() && total.is_some();
+        if needs_ends && text(ENDS).is_none() {
+            let message =
+                "total coils need their ends (open, closed or closed_ground): how many are active depends on them";
+            return Err(message.to_owned());
+        }
         let needed = |value: Option<f64>, name: &str| value.ok_or_else(|| format!("there is no {name}"));
-        let wire_mm = needed(number(&WIRE_DIAMETER)?, "wire diameter")?;
-        let by_outer = number(&OUTER_DIAMETER)?.map(|outer_mm| outer_mm - wire_mm);
-        let by_inner = number(&INNER_DIAMETER)?.map(|inner_mm| inner_mm + wire_mm);
-        let ends = text(&ENDS).map_or(Ok(EndsSpec::default()), ends)?;
-        let by_total = number(&TOTAL_COILS)?.map(|total| total - ends.inactive_coils());
+        let wire_mm = needed(number(WIRE_DIAMETER)?, "wire diameter")?;
+        let by_outer = number(OUTER_DIAMETER)?.map(|outer_mm| outer_mm - wire_mm);
+        let by_inner = number(INNER_DIAMETER)?.map(|inner_mm| inner_mm + wire_mm);
+        let ends = text(ENDS).map_or(Ok(EndsSpec::default()), ends)?;
+        let by_total = total.map(|total| total - ends.inactive_coils());
         Ok(CoilDesign {
-            name: text(&NAME).map_or_else(|| format!("line {line_number}"), str::to_owned),
-            coil_diameter_mm: needed(number(&MEAN_DIAMETER)?.or(by_outer).or(by_inner), "coil diameter")?,
+            name: text(NAME).map_or_else(|| format!("line {line_number}"), str::to_owned),
+            coil_diameter_mm: needed(number(MEAN_DIAMETER)?.or(by_outer).or(by_inner), "coil diameter")?,
             wire_diameter_mm: wire_mm,
-            active_coils: needed(number(&ACTIVE_COILS)?.or(by_total), "number of coils")?,
-            free_length_mm: needed(number(&FREE_LENGTH)?, "free length")?,
+            active_coils: needed(active.or(by_total), "number of coils")?,
+            free_length_mm: needed(number(FREE_LENGTH)?, "free length")?,
             ends,
-            material: text(&MATERIAL).map_or(Ok(Material::SpringSteel), material)?,
+            material: text(MATERIAL).map_or(Ok(Material::SpringSteel), material)?,
         })
     }
 
@@ -113,6 +125,23 @@ impl Columns {
             _ => Err(format!("expected a finite number above 0, found \"{field}\"")),
         }
     }
+}
+
+/// A column's name for comparison: without unit, words joined by underscores, in lower case but for a single letter.
+fn normalised(name: &str) -> String {
+    let name = name.replace(['(', '[', ')', ']', '/', '.', ' ', '-'], "_");
+    let words: Vec<&str> =
+        name.split('_').filter(|word| !word.is_empty() && !word.eq_ignore_ascii_case("mm")).collect();
+    match &words[..] {
+        [letter] if letter.len() == 1 => (*letter).to_owned(),
+        words => words.join("_").to_lowercase(),
+    }
+}
+
+/// Whether the unit of a column is the inch.
+fn is_in_inches(name: &str) -> bool {
+    let name = name.to_lowercase();
+    ["(in)", "[in]", "inch", "_in"].iter().any(|unit| name.ends_with(unit)) || name.ends_with("inches")
 }
 
 fn unquoted(field: &str) -> &str {
@@ -177,7 +206,17 @@ mod tests {
         let inner = read("id,wire,active,l0\n22,3,12,120\n").unwrap();
         assert_eq!((inner[0].coil_diameter_mm, inner[0].label()), (25.0, "line 2".to_owned()));
         let error = read("id,wire,l0\n22,3,120\n").unwrap_err();
-        assert!(error.contains("active_coils or total_coils"), "{error}");
+        assert!(error.contains("active_coils") && error.contains("total_coils"), "{error}");
+        // EN 13906-1: d of the wire, D of the coil, n active coils; and names with units.
+        let of_standard = read("D,d,n,L0\n25,3,12,120\n").unwrap();
+        let with_units = read("Mean diameter (mm),Wire d [mm],Active coils,Free length_mm\n25,3,12,120\n").unwrap();
+        assert_eq!(of_standard, with_units);
+        assert_eq!((of_standard[0].coil_diameter_mm, of_standard[0].wire_diameter_mm), (25.0, 3.0));
+        let error = read("OD (in),wire,active,l0\n1.1,3,12,120\n").unwrap_err();
+        assert!(error.contains("inches"), "{error}");
+        // Of 10.5 closed coils 8.5 are active.
+        let error = read("wire,od,total coils,free length\n3.2,35.2,10.5,100\n").unwrap_err();
+        assert!(error.contains("line 2: total coils need their ends"), "{error}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::limits::Violation;
 use super::spec::{CoilDesign, DesignSpec};
 use crate::dynamics::{HeadSpec, LinkageSpec, stands_with_mass};
+use crate::elasticity::ElasticityError;
 use crate::spec::Source;
 use crate::study::spring::{DesignMetrics, StressCycle, Wire, closed_form};
 use crate::study::sweep::Measure;
@@ -50,8 +51,10 @@ pub(super) struct Evaluator {
 impl Evaluator {
     /// Evaluates a coil in closed form.
     pub fn evaluate(&self, coil: &CoilDesign) -> Evaluation {
-        if coil.spring().design().is_err() {
-            return Evaluation::Invalid("geometry");
+        match coil.spring().design() {
+            Ok(_) => {}
+            Err(ElasticityError::OutsideRange { .. }) => return Evaluation::Invalid("range of the force law"),
+            Err(_) => return Evaluation::Invalid("geometry"),
         }
         let head = self.head_on(coil);
         let Ok(figures) = closed_form(&head, &self.source, &self.spec.shake) else {

@@ -12,7 +12,7 @@ use crate::spec::{Kind, Source, SpecError, find_from, parse};
 use crate::study::coverage::CoveragePlan;
 use crate::study::progress::PieceProgress;
 use crate::study::spring::{DesignMetrics, Wire, simulated};
-use crate::study::sweep::{pareto_set, spread};
+use crate::study::sweep::{Measure, pareto_set, spread};
 use crate::study::{OnProgress, StudyError};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -120,13 +120,23 @@ impl DesignSearch {
         }
         let measures = spec.goals.iter().map(|goal| goal.measure).chain(spec.limits.iter().map(|limit| limit.measure));
         if let Some(measure) = measures.into_iter().find(|measure| !measure.has_closed_form()) {
-            let message = format!("{} has no closed form, so it cannot be a goal or a limit: remove it", measure.key());
+            let message = format!(
+                "{} has no closed form, so it cannot be a goal or a limit: remove it, or compare springs by it in a sweep with \
+                 `front` (as specs/studies/spring_sweep.ron)",
+                measure.key()
+            );
             return Err(SpecError::about(source, measure.key(), message).into());
         }
         if spec.evaluations == 0 || spec.candidates == 0 {
             return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
         let space = Space::of(spec, source)?;
+        let needs_strength = spec.goals.iter().any(|goal| goal.measure == Measure::StressShare);
+        if needs_strength && !space.has_strength() {
+            let message = "stress_share needs the strength of the wire, which moduli(...) do not state: remove the goal, or \
+                           choose spring_steel or stainless";
+            return Err(SpecError::about(source, Measure::StressShare.key(), message).into());
+        }
         Ok(Self { evaluator: Evaluator { spec: spec.clone(), head, source: head_source }, lidar, space })
     }
 

@@ -52,6 +52,16 @@ impl Space {
     }
 }
 
+impl Space {
+    /// Whether the strength of the wire is known; a catalogue has only materials of known strength.
+    pub fn has_strength(&self) -> bool {
+        match self {
+            Space::Catalogue(_) => true,
+            Space::Coils(coils) => !matches!(coils.material, Material::Moduli { .. }),
+        }
+    }
+}
+
 impl CoilSpace {
     /// The coil that can be ordered nearest to a point of the unit cube.
     pub fn coil_at(&self, point: &[f64]) -> CoilDesign {
