@@ -227,11 +227,17 @@ fn each_limit_rejects_what_it_names() {
 fn a_material_without_strength_is_searched_and_its_unchecked_limits_are_named() {
     let (spec, source) = load("spring_design");
     let mut spec = DesignSpec { evaluations: 300, candidates: 1, ..spec };
-    spec.goals.retain(|goal| goal.measure.key() == "rocking_hz");
     if let SpaceSpec::Coil { material, .. } = &mut spec.space {
         let text = "moduli(youngs_gpa: 110.0, shear_gpa: 42.0)";
         *material = parse(&Source::in_memory("material", text)).unwrap();
     }
+    for (goal, missing) in [("stress_share", "strength"), ("spring_mass_g", "density")] {
+        let mut spec = spec.clone();
+        spec.goals.retain(|one| one.measure.key() == goal);
+        let error = DesignSearch::new(&spec, &source).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(&format!("{goal} needs the {missing} of the material")), "{error}");
+    }
+    spec.goals.retain(|goal| goal.measure.key() == "rocking_hz");
     let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
     let [design] = &study.candidates[..] else { panic!("{:?}", study.rejected) };
     assert_eq!(design.unchecked, ["yield_margin", "stress_share", "fatigue_margin"]);

@@ -12,7 +12,7 @@ use crate::spec::{Kind, Source, SpecError, find_from, parse};
 use crate::study::coverage::CoveragePlan;
 use crate::study::progress::PieceProgress;
 use crate::study::spring::{DesignMetrics, Wire, simulated};
-use crate::study::sweep::{Measure, pareto_set, spread};
+use crate::study::sweep::{pareto_set, spread};
 use crate::study::{OnProgress, StudyError};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -131,11 +131,13 @@ impl DesignSearch {
             return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
         let space = Space::of(spec, source)?;
-        let needs_strength = spec.goals.iter().any(|goal| goal.measure == Measure::StressShare);
-        if needs_strength && !space.has_strength() {
-            let message = "stress_share needs the strength of the wire, which moduli(...) do not state: remove the goal, or \
-                           choose spring_steel or stainless";
-            return Err(SpecError::about(source, Measure::StressShare.key(), message).into());
+        for goal in &spec.goals {
+            if let Some(missing) = space.missing_for(goal.measure) {
+                let key = goal.measure.key();
+                let message =
+                    format!("{key} needs the {missing} of the material: remove the goal, or state it in moduli(...)");
+                return Err(SpecError::about(source, key, message).into());
+            }
         }
         Ok(Self { evaluator: Evaluator { spec: spec.clone(), head, source: head_source }, lidar, space })
     }

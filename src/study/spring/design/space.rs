@@ -4,6 +4,7 @@ use super::catalogue::catalogue;
 use super::spec::{CoilDesign, DesignSpec, SpaceSpec};
 use crate::elasticity::{EndsSpec, Material};
 use crate::spec::{Source, SpecError};
+use crate::study::sweep::Measure;
 
 /// A validated design space.
 pub(super) enum Space {
@@ -53,11 +54,14 @@ impl Space {
 }
 
 impl Space {
-    /// Whether the strength of the wire is known; a catalogue has only materials of known strength.
-    pub fn has_strength(&self) -> bool {
-        match self {
-            Space::Catalogue(_) => true,
-            Space::Coils(coils) => !matches!(coils.material, Material::Moduli { .. }),
+    /// The property of the material without which no spring of the space has a measure; the materials of a catalogue have all.
+    pub fn missing_for(&self, measure: Measure) -> Option<&'static str> {
+        let Space::Coils(CoilSpace { material, bounds, .. }) = self else { return None };
+        let wire_m = 1e-3 * bounds[1][0];
+        match measure {
+            Measure::StressShare => material.yield_pa(wire_m).is_none().then_some("strength"),
+            Measure::SpringMassG => material.density_kg_per_m3().is_none().then_some("density"),
+            _ => None,
         }
     }
 }
