@@ -26,6 +26,31 @@ pub struct BoundModel {
     pub clock_rate: f64,
 }
 
+#[cfg(test)]
+impl BoundModel {
+    /// A model with errors of all kinds.
+    pub(super) fn for_tests() -> Self {
+        Self {
+            head_from_imu: Pose::translation(0.03, 0.0, 0.05),
+            imu: ImuNoise {
+                gyro_density_rad_per_s_per_sqrt_hz: 1e-3,
+                accel_density_m_per_s2_per_sqrt_hz: 1e-2,
+                gyro_bias_walk_rad_per_s_per_sqrt_s: 1e-4,
+                accel_bias_walk_m_per_s2_per_sqrt_s: 1e-3,
+                gyro_turn_on_bias_rad_per_s: 0.01,
+                accel_turn_on_bias_m_per_s2: 0.1,
+                gyro_limit_rad_per_s: 10.0,
+                accel_limit_m_per_s2: 50.0,
+            },
+            gyro_matrix: (0.01, 0.005),
+            accel_matrix: (0.01, 0.005),
+            range_offset_m: 0.01,
+            clock_offset_s: 0.01,
+            clock_rate: 1e-4,
+        }
+    }
+}
+
 /// Cramer-Rao bounds: minimum RMS errors and standard deviations of any unbiased estimator.
 ///
 /// With an unknown map, position and heading of the whole trajectory are not observable. All errors are then those after the

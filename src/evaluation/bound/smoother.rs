@@ -231,36 +231,15 @@ fn alignment_reduction(run: &Run<'_>, last: &State) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2};
-    use crate::measurement::{ImuNoise, ImuSample};
+    use crate::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2};
+    use crate::measurement::ImuSample;
     use approx::assert_relative_eq;
-
-    fn model() -> BoundModel {
-        BoundModel {
-            head_from_imu: Pose::translation(0.03, -0.02, 0.05),
-            imu: ImuNoise {
-                gyro_density_rad_per_s_per_sqrt_hz: 1e-3,
-                accel_density_m_per_s2_per_sqrt_hz: 1e-2,
-                gyro_bias_walk_rad_per_s_per_sqrt_s: 1e-4,
-                accel_bias_walk_m_per_s2_per_sqrt_s: 1e-3,
-                gyro_turn_on_bias_rad_per_s: 0.01,
-                accel_turn_on_bias_m_per_s2: 0.1,
-                gyro_limit_rad_per_s: 10.0,
-                accel_limit_m_per_s2: 50.0,
-            },
-            gyro_matrix: (0.01, 0.005),
-            accel_matrix: (0.01, 0.005),
-            range_offset_m: 0.01,
-            clock_offset_s: 0.01,
-            clock_rate: 1e-4,
-        }
-    }
 
     /// Two epochs in motion, with an IMU sample each.
     fn epochs() -> [Epoch; 2] {
         [0.0, EPOCH.seconds()].map(|t_s| {
             let at = |t_s: f64| {
-                let turn = crate::geometry::Rotation::from_scaled_axis(Vector::new(0.4, -0.7, 1.1) * (1.0 + t_s));
+                let turn = Rotation::from_scaled_axis(Vector::new(0.4, -0.7, 1.1) * (1.0 + t_s));
                 Pose::from_parts(Vector::new(1.0, 0.6 * t_s, -0.3 * t_s).into(), turn)
             };
             let mut epoch = Epoch::new(&at(t_s), &at(t_s - 1e-3), 1e-3);
@@ -282,7 +261,7 @@ mod tests {
     #[test]
     fn the_products_of_the_non_zero_blocks_are_those_of_the_whole_matrices() {
         let epochs = epochs();
-        let step = Step::between(&model(), &epochs[0], &epochs[1], &Vector::new(0.1, 0.2, 0.3), 7.0);
+        let step = Step::between(&BoundModel::for_tests(), &epochs[0], &epochs[1], &Vector::new(0.1, 0.2, 0.3), 7.0);
         let (f, p, l) = (step.transition, positive(0.1), positive(0.7));
         assert_relative_eq!(step.propagate(&p), f * p * f.transpose() + step.noise, max_relative = 1e-10);
         assert_relative_eq!(step.propagate_back(&l), f.transpose() * l * f, epsilon = 1e-10, max_relative = 1e-10);

@@ -107,34 +107,13 @@ mod tests {
     use super::super::smoother;
     use super::*;
     use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
-    use crate::measurement::{ImuNoise, ImuSample};
+    use crate::measurement::ImuSample;
     use approx::assert_relative_eq;
     use nalgebra::Vector3;
 
-    fn model() -> BoundModel {
-        BoundModel {
-            head_from_imu: Pose::translation(0.03, 0.0, 0.05),
-            imu: ImuNoise {
-                gyro_density_rad_per_s_per_sqrt_hz: 1e-3,
-                accel_density_m_per_s2_per_sqrt_hz: 1e-2,
-                gyro_bias_walk_rad_per_s_per_sqrt_s: 1e-4,
-                accel_bias_walk_m_per_s2_per_sqrt_s: 1e-3,
-                gyro_turn_on_bias_rad_per_s: 0.01,
-                accel_turn_on_bias_m_per_s2: 0.1,
-                gyro_limit_rad_per_s: 10.0,
-                accel_limit_m_per_s2: 50.0,
-            },
-            gyro_matrix: (0.01, 0.005),
-            accel_matrix: (0.01, 0.005),
-            range_offset_m: 0.01,
-            clock_offset_s: 0.01,
-            clock_rate: 1e-4,
-        }
-    }
-
     /// Epochs and beams of a head that swings along x in a box of 4 m, with 27 beams at each epoch.
     fn swing(seconds: f64) -> (Vec<Epoch>, Sightings) {
-        let model = model();
+        let model = BoundModel::for_tests();
         let (mut epochs, mut sightings) = (Vec::new(), Sightings::default());
         for k in 0..=(seconds / EPOCH.seconds()) as usize {
             let at = |t: f64| Pose::translation(0.3 * (2.0 * t).sin(), 0.0, 0.0);
@@ -182,8 +161,8 @@ mod tests {
         // Of 5 s, all kept epochs are 0.2 s apart.
         let (epochs, sightings) = swing(5.0);
         let known = MapPrior { plane: Vector3::repeat(1e-7), first_pose: None, ..MapPrior::UNKNOWN };
-        let found = bound(&model(), Stamp::default(), &epochs, &sightings, known).unwrap();
-        let expected = smoother::bound(&model(), Stamp::default(), &epochs);
+        let found = bound(&BoundModel::for_tests(), Stamp::default(), &epochs, &sightings, known).unwrap();
+        let expected = smoother::bound(&BoundModel::for_tests(), Stamp::default(), &epochs);
         // The mean over the kept epochs differs from that over all epochs.
         let at_kept =
             expected.stamps.iter().zip(&expected.position_sigma_m).filter(|(at, _)| found.stamps.contains(at));
@@ -201,7 +180,7 @@ mod tests {
         let (epochs, sightings) = swing(8.0);
         let aligned = |max_joint_planes: usize| {
             let prior = MapPrior { max_joint_planes, ..MapPrior::UNKNOWN };
-            bound(&model(), Stamp::default(), &epochs, &sightings, prior).unwrap()
+            bound(&BoundModel::for_tests(), Stamp::default(), &epochs, &sightings, prior).unwrap()
         };
         let [all, some, none] = [6, 3, 0].map(aligned);
         assert!(all.aligned_position_rmse_m < some.aligned_position_rmse_m);
@@ -217,7 +196,8 @@ mod tests {
         let (epochs, sightings) = swing(8.0);
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| bound(&model(), Stamp::default(), &epochs, &sightings, MapPrior::UNKNOWN)).unwrap()
+            pool.install(|| bound(&BoundModel::for_tests(), Stamp::default(), &epochs, &sightings, MapPrior::UNKNOWN))
+                .unwrap()
         };
         assert_eq!(on(1), on(3));
     }
