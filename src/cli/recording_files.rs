@@ -69,6 +69,12 @@ impl RecordingFiles {
             "{} next to it is the true trajectory of another recording: choose another --out",
             truth.display()
         );
+        let model = Companion::HeadModel.of(wanted);
+        ensure!(
+            !model.exists() || is_head_model(&model),
+            "{} next to it was not written by zsim: choose another --out",
+            model.display()
+        );
         for path in &outputs {
             ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
         }
@@ -164,6 +170,11 @@ impl Drop for RecordingFiles {
     }
 }
 
+/// Whether a file is a model of a head as `zsim` writes it.
+fn is_head_model(path: &Path) -> bool {
+    std::fs::read_to_string(path).is_ok_and(|text| text.contains("<robot name=\"zsim_head\">"))
+}
+
 /// Whether two paths in one folder name one file, also where case does not matter.
 fn is_same_name(a: &Path, b: &Path) -> bool {
     a.to_string_lossy().eq_ignore_ascii_case(&b.to_string_lossy())
@@ -219,7 +230,10 @@ mod tests {
         let wanted = here.path().join("run.mcap");
         let (old, model) = (here.path().join("run.tum"), here.path().join("run.urdf"));
         std::fs::write(&old, "old").unwrap();
-        std::fs::write(&model, "another head").unwrap();
+        std::fs::write(&model, "a robot").unwrap();
+        let error = RecordingFiles::reserve(&wanted, ALL, true, &[]).err().unwrap();
+        assert!(error.to_string().contains("not written by zsim"), "{error}");
+        std::fs::write(&model, "<robot name=\"zsim_head\">").unwrap();
         let files = RecordingFiles::reserve(&wanted, &[Companion::Truth, Companion::Layout], true, &[]).unwrap();
         std::fs::write(files.recording(), "new recording").unwrap();
         std::fs::write(files.companion(Companion::Truth).unwrap(), "new").unwrap();
