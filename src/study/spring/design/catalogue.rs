@@ -17,7 +17,7 @@ const INNER_DIAMETER: &[&str] = &["inner_diameter", "inside_diameter", "id", "di
 const WIRE_DIAMETER: &[&str] = &["wire_diameter", "wire", "wire_size", "wire_d", "d"];
 const ACTIVE_COILS: &[&str] = &["active_coils", "active", "n"];
 const TOTAL_COILS: &[&str] = &["total_coils", "coils", "nt"];
-const FREE_LENGTH: &[&str] = &["free_length", "l0", "L0"];
+const FREE_LENGTH: &[&str] = &["free_length", "l0"];
 const ENDS: &[&str] = &["ends", "end_type", "end"];
 const MATERIAL: &[&str] = &["material", "wire_material"];
 
@@ -58,7 +58,9 @@ impl Columns {
     fn of(header: &str) -> Result<Self, String> {
         let separator = [';', '\t'].into_iter().find(|c| header.contains(*c)).unwrap_or(',');
         let names: Vec<&str> = header.split(separator).map(unquoted).collect();
-        if let Some(name) = names.iter().find(|name| is_in_inches(name)) {
+        let lengths = [MEAN_DIAMETER, OUTER_DIAMETER, INNER_DIAMETER, WIRE_DIAMETER, FREE_LENGTH].concat();
+        let in_inches = |name: &&&str| without_inches(name).is_some_and(|length| lengths.contains(&length.as_str()));
+        if let Some(name) = names.iter().find(in_inches) {
             return Err(format!("the column \"{name}\" is in inches; lengths must be in mm"));
         }
         let columns = Self { separator, names: names.into_iter().map(normalised).collect() };
@@ -127,21 +129,27 @@ impl Columns {
     }
 }
 
-/// A column's name for comparison: without unit, words joined by underscores, in lower case but for a single letter.
+/// A column's name for comparison: without the unit mm, words joined by underscores, in lower case but for a single letter.
 fn normalised(name: &str) -> String {
-    let name = name.replace(['(', '[', ')', ']', '/', '.', ' ', '-'], "_");
-    let words: Vec<&str> =
-        name.split('_').filter(|word| !word.is_empty() && !word.eq_ignore_ascii_case("mm")).collect();
-    match &words[..] {
+    joined(&words(name).filter(|word| !word.eq_ignore_ascii_case("mm")).collect::<Vec<_>>())
+}
+
+/// A column's name as from [`normalised`] without the unit inch; `None` if this is not its unit.
+fn without_inches(name: &str) -> Option<String> {
+    let words: Vec<&str> = words(name).collect();
+    let (unit, quantity) = words.split_last()?;
+    ["in", "inch", "inches"].contains(&unit.to_lowercase().as_str()).then(|| joined(quantity))
+}
+
+fn words(name: &str) -> impl Iterator<Item = &str> {
+    name.split(['(', '[', ')', ']', '/', '.', ' ', '-', '_']).filter(|word| !word.is_empty())
+}
+
+fn joined(words: &[&str]) -> String {
+    match words {
         [letter] if letter.len() == 1 => (*letter).to_owned(),
         words => words.join("_").to_lowercase(),
     }
-}
-
-/// Whether the unit of a column is the inch.
-fn is_in_inches(name: &str) -> bool {
-    let name = name.to_lowercase();
-    ["(in)", "[in]", "inch", "_in"].iter().any(|unit| name.ends_with(unit)) || name.ends_with("inches")
 }
 
 fn unquoted(field: &str) -> &str {
@@ -214,6 +222,7 @@ mod tests {
         assert_eq!((of_standard[0].coil_diameter_mm, of_standard[0].wire_diameter_mm), (25.0, 3.0));
         let error = read("OD (in),wire,active,l0\n1.1,3,12,120\n").unwrap_err();
         assert!(error.contains("inches"), "{error}");
+        assert_eq!(read("Built in,D,d,n,L0\nHalle,25,3,12,120\n").unwrap(), of_standard, "not a length");
         // Of 10.5 closed coils 8.5 are active.
         let error = read("wire,od,total coils,free length\n3.2,35.2,10.5,100\n").unwrap_err();
         assert!(error.contains("line 2: total coils need their ends"), "{error}");
