@@ -303,6 +303,13 @@ mod tests {
         let plan = CoveragePlan { duration_s: 4.0, ..CoveragePlan::default() };
         let report = spring_report(&spec, &source, &Shake::default(), &utm30lx(), &plan).unwrap();
         assert!(report.stands && report.heaviest_head_kg.unwrap() > report.head_mass_kg);
+        let buckling_at = |margin: f64| {
+            let mut report = report.clone();
+            report.coil.as_mut().unwrap().buckling_margin = Some(margin);
+            let mut rows = super::super::tables::properties(&report).into_iter();
+            rows.find(|row| row.name == "buckling load").unwrap().value
+        };
+        assert!(buckling_at(1.24).contains("valid up to 80 %") && !buckling_at(1.26).contains("valid"));
         let coil = report.coil.unwrap();
         // 0.35 kg and half of the wire's 52 g at 4282 N/m compress the spring by 0.86 mm; 12 equal gaps add up to 120 - 36 - 0.86 mm.
         assert!((report.rest.unwrap().sag_mm.unwrap() - 0.86).abs() < 0.02);
