@@ -4,7 +4,7 @@ use crate::background;
 use crate::failure::Failure;
 use crate::recording::Recording;
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use zsim::simulation::{Scenario, Simulation};
 use zsim::study::record;
 
@@ -36,11 +36,30 @@ pub fn simulate(
         let message = format!("{} exists: pass another path, or overwrite=True", existing.display());
         return Err(Failure::input(message));
     }
-    let written = recording.clone();
-    background::run(py, progress.as_ref(), move |progress| {
+    // The old files last until the new ones are complete.
+    let files = [recording.clone(), truth];
+    let replaces = files.iter().any(|file| file.exists());
+    let written = if replaces { files.each_ref().map(|file| unfinished(file)) } else { files.clone() };
+    let [mcap, tum] = written.clone();
+    let recorded = background::run(py, progress.as_ref(), move |progress| {
         let simulation = Simulation::prepare(&scenario)?;
-        progress.monitored(|watch| record(&simulation, &written, &truth, false, watch))?;
+        progress.monitored(|watch| record(&simulation, &mcap, &tum, false, watch))?;
         Ok(())
-    })?;
+    });
+    for (from, to) in written.iter().zip(&files).rev().filter(|_| replaces) {
+        match &recorded {
+            Ok(()) => std::fs::rename(from, to)
+                .map_err(|error| Failure::other(format!("{} cannot be replaced: {error}", to.display())))?,
+            // A fragment that cannot be removed is next to the complete file, under another name.
+            Err(_) => drop(std::fs::remove_file(from)),
+        }
+    }
+    recorded?;
     Recording::of(recording, folder)
+}
+
+/// Name of a file until it is complete: `run.partial.mcap` for `run.mcap`.
+fn unfinished(file: &Path) -> PathBuf {
+    let ending = file.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+    file.with_extension(format!("partial{ending}"))
 }

@@ -192,6 +192,24 @@ def test_progress_reaches_the_end_and_an_exception_of_it_stops():
         zsim.simulate(scene="mocap_room", duration_s=600.0, progress=fail)
 
 
+def test_a_recording_is_overwritten_only_by_a_complete_one(tmp_path):
+    path = tmp_path / "run.mcap"
+    files = [path, path.with_suffix(".tum")]
+    zsim.simulate(scene="mocap_room", duration_s=1.0, path=path)
+    old = [file.read_bytes() for file in files]
+
+    def fail(stage, fraction):
+        raise ValueError("enough")
+
+    with pytest.raises(ValueError, match="enough"):
+        zsim.simulate(scene="mocap_room", duration_s=600.0, path=path, overwrite=True, progress=fail)
+    assert [file.read_bytes() for file in files] == old
+    assert len(list(tmp_path.iterdir())) == 2
+    zsim.simulate(scene="mocap_room", duration_s=1.0, seed=2, path=path, overwrite=True)
+    assert all(file.read_bytes() != before for file, before in zip(files, old))
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 def test_an_interrupt_stops_a_simulation():
     # A shell starts background jobs with the signal ignored; Python then has no handler for it.
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
