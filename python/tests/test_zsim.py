@@ -205,8 +205,9 @@ def test_a_recording_is_overwritten_only_by_a_complete_one(tmp_path):
         zsim.simulate(scene="mocap_room", duration_s=600.0, path=path, overwrite=True, progress=fail)
     assert [file.read_bytes() for file in files] == old
     assert len(list(tmp_path.iterdir())) == 2
-    zsim.simulate(scene="mocap_room", duration_s=1.0, seed=2, path=path, overwrite=True)
-    assert all(file.read_bytes() != before for file, before in zip(files, old))
+    # Twice as long: the truth of a scene whose motion has no noise is the same for every seed.
+    zsim.simulate(scene="mocap_room", duration_s=2.0, path=path, overwrite=True)
+    assert all(file.stat().st_size > 1.5 * len(before) for file, before in zip(files, old))
     assert len(list(tmp_path.iterdir())) == 2
 
 
