@@ -7,22 +7,22 @@ use std::hint::black_box;
 use zsim::dynamics::{HeadModel, LinkageSpec, load};
 use zsim::elasticity::SpringSpec;
 use zsim::spec::{Kind, find, parse};
-use zsim::study::gains::{GainPlan, gain_curves};
+use zsim::study::gains::{GainPlan, GainWatch, gain_curves};
 use zsim::study::spring::design::{DesignSearch, DesignSpec};
-use zsim::study::spring::{Shake, closed_form};
+use zsim::study::spring::{MISSION_HOURS, Shake, closed_form};
 
 fn design_points(c: &mut Criterion) {
     let (spec, source) = load("handheld").unwrap();
     let shake = Shake::default();
     c.bench_function("closed form of a stable design", |b| {
-        b.iter(|| closed_form(black_box(&spec), &source, &shake).unwrap());
+        b.iter(|| closed_form(black_box(&spec), &source, &shake, MISSION_HOURS).unwrap());
     });
     let mut unstable = spec.clone();
     if let LinkageSpec::Spring { spring: SpringSpec::Coil { wire_diameter_mm, .. }, .. } = &mut unstable.linkage {
         *wire_diameter_mm = 2.0;
     }
     c.bench_function("closed form of an unstable design", |b| {
-        b.iter(|| closed_form(black_box(&unstable), &source, &shake).unwrap_err());
+        b.iter(|| closed_form(black_box(&unstable), &source, &shake, MISSION_HOURS).unwrap_err());
     });
 }
 
@@ -42,7 +42,7 @@ fn studies(c: &mut Criterion) {
     let (spec, source) = load("handheld").unwrap();
     let head = HeadModel::new(&spec, &source).unwrap();
     group.bench_function("gain curves of the handheld head, six axes", |b| {
-        b.iter(|| gain_curves(&head, &GainPlan::default(), &|_| ()).unwrap());
+        b.iter(|| gain_curves(&head, &GainPlan::default(), GainWatch::silent()).unwrap());
     });
     group.finish();
 }

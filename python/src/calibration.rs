@@ -11,6 +11,9 @@ use zsim::spec::{Kind, find, parse};
 /// A pose: position, m, and quaternion x, y, z, w.
 type PoseNumbers = ([f64; 3], [f64; 4]);
 
+/// Largest difference of a quaternion's norm from 1: four digits are enough to state a rotation.
+const MAX_NORM_ERROR: f64 = 1e-3;
+
 /// Poses and noise of lidar and IMU.
 #[pyclass(frozen, module = "zsim")]
 pub struct Calibration(pub measurement::Calibration);
@@ -24,8 +27,8 @@ impl Calibration {
         let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
         let imu = Imu::new(&parse(&imu_source)?, &imu_source)?;
         Ok(Self(measurement::Calibration {
-            head_from_laser: pose(head_from_laser),
-            head_from_imu: pose(head_from_imu),
+            head_from_laser: pose("head_from_laser", head_from_laser)?,
+            head_from_imu: pose("head_from_imu", head_from_imu)?,
             imu: imu.noise(),
             imu_averaging: imu.averaging(),
             lidar: lidar.noise(),
@@ -51,8 +54,17 @@ impl Calibration {
     }
 }
 
-fn pose((position_m, quaternion): PoseNumbers) -> Pose {
-    Pose::from_parts(Vector::from(position_m).into(), rotation(quaternion))
+/// The pose that the argument `name` gives.
+fn pose(name: &str, (position_m, quaternion): PoseNumbers) -> Result<Pose, Failure> {
+    let is_finite = position_m.iter().chain(&quaternion).all(|x| x.is_finite());
+    let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if !is_finite || (norm - 1.0).abs() > MAX_NORM_ERROR {
+        let message = format!(
+            "{name}: expected a finite position (m) and a unit quaternion x, y, z, w; found {position_m:?} and {quaternion:?}"
+        );
+        return Err(Failure::input(message));
+    }
+    Ok(Pose::from_parts(Vector::from(position_m).into(), rotation(quaternion)))
 }
 
 fn numbers(pose: &Pose) -> PoseNumbers {

@@ -19,6 +19,13 @@ mod window;
 /// The compiled part of the package `zsim`.
 #[pyo3::pymodule]
 mod _zsim {
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
     #[pymodule_export]
     use super::calibration::Calibration;
     #[pymodule_export]

@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::recording::Recording;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
+use zsim::recording::other_format;
 use zsim::simulation::{Scenario, Simulation};
 use zsim::study::record;
 
@@ -31,6 +32,12 @@ pub fn simulate(
     let truth = recording.with_extension("tum");
     if truth == recording {
         return Err(Failure::input("path: the recording needs another ending than .tum, such as .mcap"));
+    }
+    if let Some(format) = other_format(&recording) {
+        let name = recording.display();
+        return Err(Failure::input(format!(
+            "path={name}: this is the ending of {format}; recordings are MCAP: use .mcap"
+        )));
     }
     if let Some(existing) = [&recording, &truth].into_iter().find(|file| file.exists() && !overwrite) {
         let message = format!("{} exists: pass another path, or overwrite=True", existing.display());

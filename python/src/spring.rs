@@ -13,7 +13,7 @@ use zsim::random::Seed;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, find, parse};
 use zsim::study::coverage::CoveragePlan;
-use zsim::study::gains::{AXES, GainCurve, GainPlan, axis_name, gain_curve};
+use zsim::study::gains::{AXES, GainCurve, GainPlan, GainWatch, axis_name, gain_curve};
 use zsim::study::spring::{Shake, SpringReport, spring_report};
 
 /// Settings of a spring, JSON.
@@ -49,6 +49,7 @@ impl Spring {
     #[new]
     fn new(py: Python<'_>, settings: &str) -> Result<Self, Failure> {
         let settings: Settings = serde_json::from_str(settings)?;
+        settings.shake.check().map_err(Failure::input)?;
         let (spec, source) = head(&settings)?;
         let lidar_source = find(Kind::Lidar, &settings.lidar)?;
         let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
@@ -109,7 +110,8 @@ impl Spring {
         let (spec, source) = (self.spec.clone(), self.source.clone());
         let curve: GainCurve = background::run(py, progress.as_ref(), move |progress| {
             let head = HeadModel::new(&spec, &source)?;
-            Ok(gain_curve(&head, axis, &plan, &|fraction| progress.set("shaking", fraction))?)
+            let on_progress = |fraction| progress.set("shaking", fraction);
+            Ok(gain_curve(&head, axis, &plan, GainWatch { stop: progress.stop_flag(), on_progress: &on_progress })?)
         })?;
         as_python(py, &curve)
     }

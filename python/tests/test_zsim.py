@@ -3,6 +3,7 @@
 import _thread
 import gc
 import json
+import math
 import subprocess
 import signal
 import threading
@@ -211,18 +212,59 @@ def test_a_recording_is_overwritten_only_by_a_complete_one(tmp_path):
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_an_interrupt_stops_a_simulation():
+def processor_s():
+    """Processor time of this process with its threads, s."""
+    return time.clock_gettime(time.CLOCK_PROCESS_CPUTIME_ID)
+
+
+@pytest.mark.parametrize(
+    "minutes_long",
+    [
+        lambda: zsim.simulate(scene="office", duration_s=36000.0),
+        lambda: zsim.Spring("handheld").gains(realisations=500),
+    ],
+)
+def test_an_interrupt_stops_a_computation(minutes_long):
     # A shell starts background jobs with the signal ignored; Python then has no handler for it.
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
-    threading.Timer(0.5, _thread.interrupt_main).start()
+    threading.Timer(2.5, _thread.interrupt_main).start()
     start = time.monotonic()
     try:
         with pytest.raises(KeyboardInterrupt):
-            # Takes minutes without the interrupt.
-            zsim.simulate(scene="office", duration_s=36000.0)
+            minutes_long()
     finally:
         signal.signal(signal.SIGINT, previous)
     assert time.monotonic() - start < 20.0
+    # Nothing goes on in the background.
+    after = processor_s()
+    time.sleep(1.0)
+    assert processor_s() - after < 0.3
+
+
+def test_invalid_arguments_are_errors_that_name_them(tmp_path):
+    spring = zsim.Spring(frequency_hz=np.float32(1.5), coil_diameter_mm=np.int64(25))
+    assert spring.stands
+    pose = ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
+    invalid = [
+        ("duration_s=nan", lambda: zsim.simulate(scene="mocap_room", duration_s=math.nan)),
+        ("route=", lambda: zsim.simulate(scene="mocap_room", route=["a"])),
+        ("ending of a ROS 1 bag", lambda: zsim.simulate(scene="mocap_room", duration_s=1.0, path=tmp_path / "run.bag")),
+        ("progress=5", lambda: zsim.simulate(scene="mocap_room", duration_s=1.0, progress=5)),
+        ("frequency_hz", lambda: zsim.Spring(frequency_hz=0.0)),
+        ("head_from_laser", lambda: zsim.Calibration(([math.nan, 0.0, 0.0], pose[1]), pose)),
+        ("head_from_imu", lambda: zsim.Calibration(pose, (pose[0], [0.0] * 4))),
+    ]
+    for name, call in invalid:
+        with pytest.raises(zsim.InputError, match=name):
+            call()
+
+
+def test_accelerations_in_g_are_refused():
+    pose = ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])
+    estimator = zsim.Estimator(zsim.Calibration(pose, pose))
+    with pytest.raises(zsim.InputError, match="multiply accelerations in g by 9.80665"):
+        for k in range(200):
+            estimator.push_imu(10_000_000 * k, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
 
 
 def test_a_damaged_recording_is_a_warning(recording, tmp_path):

@@ -10,7 +10,6 @@ with z up; a transform `a_from_b` maps coordinates in `b` to coordinates in `a`.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from . import _zsim
+from ._arguments import as_json
 from ._zsim import Calibration, Error, Estimate, Estimator, Evaluation, InputError, Trajectory, Window
 from ._progress import Progress, callback
 from ._recording import Recording
@@ -41,6 +41,8 @@ __all__ = [
     "sweep",
 ]
 
+
+__version__: str = _zsim.__version__
 
 _Path: TypeAlias = str | os.PathLike[str]
 _Table: TypeAlias = Literal["pandas", "polars", "pyarrow"]
@@ -82,7 +84,7 @@ def simulate(
         "duration_s": duration_s,
         "seed": seed,
     }
-    return Recording._of(_zsim.simulate(json.dumps(scenario), path, overwrite, callback(progress)))
+    return Recording._of(_zsim.simulate(as_json(scenario), path, overwrite, callback(progress)))
 
 
 def estimate(
@@ -106,7 +108,7 @@ def estimate(
         "closed_loop": closed_loop,
         "ignore_manifest": ignore_manifest,
     }
-    return _zsim.estimate(os.fspath(recording), json.dumps(settings), out, callback(progress))
+    return _zsim.estimate(os.fspath(recording), as_json(settings), out, callback(progress))
 
 
 def evaluate(estimate: Trajectory | Estimate | _Path, truth: Trajectory | Recording | _Path) -> Evaluation:
@@ -115,6 +117,8 @@ def evaluate(estimate: Trajectory | Estimate | _Path, truth: Trajectory | Record
     `estimate` is a `Trajectory`, a TUM file, or an `Estimate` (its closed loop, else its open loop). `truth` is a
     `Trajectory`, a TUM file, or a `Recording` with ground truth.
     """
+    if isinstance(estimate, Recording):
+        raise InputError(f"estimate={estimate}: a recording has no estimate; pass zsim.estimate(recording)")
     if isinstance(estimate, Estimate):
         estimate = estimate.closed_loop or estimate.open_loop
     if isinstance(truth, Recording):

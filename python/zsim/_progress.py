@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable
 from typing import TypeAlias
 
+from ._zsim import InputError
+
 Progress: TypeAlias = Callable[[str, float], object] | bool | None
 
 
@@ -13,7 +15,11 @@ def callback(progress: Progress) -> Callable[[str, float], object] | None:
     """The callback of `progress`: a callable, None, or True for a line on stderr."""
     if progress is True:
         return print_line
-    return progress if callable(progress) else None
+    if progress is None or progress is False:
+        return None
+    if not callable(progress):
+        raise InputError(f"progress={progress!r}: expected True, None or a function of stage and fraction")
+    return progress
 
 
 def print_line(stage: str, fraction: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy
 from numpy.typing import NDArray
 
 from . import _zsim
+from ._arguments import as_json
 from ._progress import Progress, callback
 
 
@@ -40,7 +40,7 @@ class Spring:
             "imu": os.fspath(imu),
             "shake": {"pitch_deg": pitch_deg, "frequency_hz": frequency_hz},
         }
-        self._spring = _zsim.Spring(json.dumps(settings))
+        self._spring = _zsim.Spring(as_json(settings))
 
     @property
     def report(self) -> dict[str, Any]:
@@ -77,7 +77,7 @@ class Spring:
         are `freq_hz`, `gain`, `gain_sigma`, `gain_model`, `coherence`, `phase_rad`, `phase_model_rad`.
         """
         settings = {"axis": axis, "up_to_hz": up_to_hz, "realisations": realisations, "seed": seed}
-        curve = self._spring.measure_gains(json.dumps(settings), callback(progress))
+        curve = self._spring.measure_gains(as_json(settings), callback(progress))
         points = curve["points"]
         return {key: numpy.array([point[key] for point in points]) for key in points[0]}
 

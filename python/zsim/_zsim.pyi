@@ -12,6 +12,8 @@ _Path: TypeAlias = str | os.PathLike[str]
 _Callback: TypeAlias = Callable[[str, float], object] | None
 _Pose: TypeAlias = tuple[Sequence[float], Sequence[float]]
 
+__version__: str
+
 class Error(Exception):
     """A computation failed."""
 

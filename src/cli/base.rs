@@ -22,8 +22,9 @@ use zsim::study;
 /// head frame with z up, at the IMU rate or more, such as the estimates and the truth of zsim.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim base results/office/closed_loop.tum --head handheld --truth \
-                        results/office/recording.mcap\n  zsim base results/office/closed_loop.tum --head handheld \
-                        --base-imu results/office/recording.mcap")]
+                        results/office/recording.mcap\n  zsim --scene office --base-imu 3dm_gx2 --out \
+                        results/two_imus\n  zsim base results/two_imus/closed_loop.tum --head handheld --base-imu \
+                        results/two_imus/recording.mcap")]
 pub(super) struct Arguments {
     /// Trajectory of the head
     #[arg(value_name = "HEAD.tum")]

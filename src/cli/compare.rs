@@ -95,13 +95,19 @@ fn compare(path: &Path, truth: &Trajectory) -> anyhow::Result<Compared> {
     Ok(Compared { label: name.clone(), name, errors, over_time, aligned })
 }
 
-/// Shortens labels that stay different from each other.
+/// Shortens labels to the last parts of the path that no other estimate has, without the ending.
 fn label(compared: &mut [Compared]) {
-    let stem = |each: &Compared| Path::new(&each.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let stems: Vec<String> = compared.iter().map(stem).collect();
-    for (each, stem) in compared.iter_mut().zip(&stems) {
-        if stems.iter().filter(|other| *other == stem).count() == 1 {
-            each.label.clone_from(stem);
+    let paths: Vec<PathBuf> = compared.iter().map(|each| Path::new(&each.name).with_extension("")).collect();
+    let end = |path: &Path, parts: usize| -> PathBuf {
+        path.components().skip(path.components().count().saturating_sub(parts)).collect()
+    };
+    for (each, path) in compared.iter_mut().zip(&paths) {
+        let differs = |parts: &usize| {
+            let label = end(path, *parts);
+            paths.iter().filter(|other| end(other, *parts) == label).count() == 1
+        };
+        if let Some(parts) = (1..=path.components().count()).find(differs) {
+            each.label = end(path, parts).display().to_string();
         }
     }
 }

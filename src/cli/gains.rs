@@ -13,8 +13,8 @@ use zsim::motion::Axis;
 use zsim::random::Seed;
 use zsim::report;
 use zsim::study::gains::{
-    AXES, GainCurve, GainPlan, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure, min_coherence,
-    page, peak_table, swing_csv, swing_figure, swing_study, with_damping,
+    AXES, GainCurve, GainPlan, GainWatch, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure,
+    min_coherence, page, peak_table, swing_csv, swing_figure, swing_study, with_damping,
 };
 use zsim::study::replace_text;
 
@@ -74,7 +74,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let head = head(arguments)?;
     let plan = plan(arguments)?;
     let bar = WorkBar::new(global, "shaking");
-    let curves = gain_curves(&head, &plan, &|fraction| bar.set_fraction(fraction))?;
+    let curves = gain_curves(
+        &head,
+        &plan,
+        GainWatch { on_progress: &|fraction| bar.set_fraction(fraction), ..GainWatch::silent() },
+    )?;
     let swings = arguments.swing.as_ref().map(|degrees| swings(&head, degrees, &plan, &bar)).transpose()?;
     bar.set_phase("plotting");
 
@@ -152,7 +156,7 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
     let study = |(before, axis): (usize, &Axis)| {
         bar.set_task(format!("swinging, {}", report::quantity_name(axis_name(*axis))));
         let on_progress = |fraction: f64| bar.set_fraction((before as f64 + fraction) / axes.len() as f64);
-        Ok(swing_study(head, *axis, degrees, &plan, &on_progress)?)
+        Ok(swing_study(head, *axis, degrees, &plan, GainWatch { on_progress: &on_progress, ..GainWatch::silent() })?)
     };
     axes.iter().enumerate().map(study).collect()
 }

@@ -52,11 +52,24 @@ fn add_pages(command: &Command, pages: &mut Vec<Page>) -> anyhow::Result<()> {
     let man = Man::new(command.clone()).source(format!("zsim {}", env!("CARGO_PKG_VERSION"))).manual("zsim manual");
     let mut roff = Vec::new();
     man.render(&mut roff).with_context(|| format!("the manual page of {} cannot be made", command.get_name()))?;
-    // The text after the help is the examples; clap_mangen gives its section another name.
-    let roff = String::from_utf8(roff)?.replace("\n.SH EXTRA\n", "\n.SH EXAMPLES\n");
+    let roff = without_hyphens(&with_examples(&String::from_utf8(roff)?));
     pages.push(Page { file: PathBuf::from(man.get_filename()), roff });
     let shown = command.get_subcommands().filter(|subcommand| !subcommand.is_hide_set());
     shown.into_iter().try_for_each(|subcommand| add_pages(subcommand, pages))
+}
+
+/// The page with the text after the help, which is the examples, as lines in a section of that name.
+fn with_examples(roff: &str) -> String {
+    let Some((before, text)) = roff.split_once("\n.SH EXTRA\n") else { return roff.to_owned() };
+    let (text, after) = text.split_at(text.find("\n.SH ").unwrap_or(text.len()));
+    let text = ["Examples:\n", "Example:\n"].into_iter().find_map(|title| text.strip_prefix(title)).unwrap_or(text);
+    format!("{before}\n.SH EXAMPLES\n.nf\n{}\n.fi{after}", text.trim_end())
+}
+
+/// The page without hyphenation, which would change commands and names.
+fn without_hyphens(roff: &str) -> String {
+    let title_end = roff.find("\n.SH ").unwrap_or(0);
+    format!("{}\n.nh{}", &roff[..title_end], &roff[title_end..])
 }
 
 #[cfg(test)]
@@ -88,7 +101,11 @@ mod tests {
         assert_eq!(files, expected);
         assert!(files.contains("zsim-sweep-plan.1") && !files.contains("zsim-sweep-task.1"));
         for page in &pages {
-            assert!(page.roff.contains("\n.SH EXAMPLES\n") || page.file.to_string_lossy().matches('-').count() > 1);
+            assert!(page.roff.contains("\n.nh\n.SH NAME\n") && !page.roff.contains("\nExample"), "{}", page.roff);
+            assert!(
+                page.roff.contains("\n.SH EXAMPLES\n.nf\n  zsim")
+                    || page.file.to_string_lossy().matches('-').count() > 1
+            );
         }
     }
 }

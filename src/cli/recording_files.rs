@@ -6,6 +6,7 @@ use anyhow::{Context, bail, ensure};
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use zsim::recording::other_format;
 
 /// A file next to a recording, with the same name and another ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +48,7 @@ impl RecordingFiles {
     /// permits to replace them. No file of `inputs` is ever replaced.
     ///
     /// # Errors
-    /// When two of the files would be one, an input would be replaced, or they cannot be created.
+    /// When the ending is that of another format, two of the files would be one, an input would be replaced, or they cannot be created.
     pub fn reserve(wanted: &Path, companions: &[Companion], force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
         if let Some(same) = Companion::ALL.iter().find(|companion| is_same_name(&companion.of(wanted), wanted)) {
             let message = format!(
@@ -55,6 +56,11 @@ impl RecordingFiles {
                 wanted.display(),
                 same.of(wanted).display()
             );
+            return Err(Usage(message).into());
+        }
+        if let Some(format) = other_format(wanted) {
+            let message =
+                format!("--out {}: this is the ending of {format}; recordings are MCAP: use .mcap", wanted.display());
             return Err(Usage(message).into());
         }
         create_parent(wanted)?;
@@ -218,7 +224,7 @@ mod tests {
         assert_eq!(without_truth.companion(Companion::Truth), None);
         std::fs::write(&wanted, "old").unwrap();
         assert!(RecordingFiles::reserve(&wanted, &[], true, &[]).is_err(), "the truth next to it is another's");
-        for name in ["y.tum", "y.TUM", "y.urdf"] {
+        for name in ["y.tum", "y.TUM", "y.urdf", "y.bag", "y.DB3"] {
             assert!(RecordingFiles::reserve(&here.path().join(name), ALL, true, &[]).is_err());
         }
         assert!(RecordingFiles::reserve(Path::new(""), ALL, true, &[]).is_err());

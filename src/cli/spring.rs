@@ -12,6 +12,7 @@ use zsim::spec::{Kind, Source, SpecError, find, parse};
 use zsim::study::coverage::{CoveragePlan, coverage_figure};
 use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
 use zsim::study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
+use zsim::study::sweep::SweepSpec;
 use zsim::study::{replace_bytes, replace_text};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
@@ -188,7 +189,12 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<Subject> {
 
 fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
     let source = find(Kind::Study, &design.file)?;
-    let spec: DesignSpec = parse(&source)?;
+    let spec: DesignSpec = parse(&source).map_err(|error| match parse::<SweepSpec>(&source) {
+        Ok(_) => {
+            SpecError::plain(&source.name, format!("it is a sweep, not a spring search: zsim study {}", design.file))
+        }
+        Err(_) => error,
+    })?;
     let bar = WorkBar::new(global, "searching");
     let study = DesignSearch::new(&spec, &source)?.run(&|fraction| bar.set_fraction(fraction))?;
     drop(bar);

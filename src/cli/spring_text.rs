@@ -3,9 +3,10 @@
 use super::coverage_text;
 use std::collections::{BTreeMap, BTreeSet};
 use zsim::report::page::PageTable;
-use zsim::report::{table, wrapped};
+use zsim::report::{digits, table, wrapped};
 use zsim::study::spring::design::{DesignStudy, VerifiedDesign};
 use zsim::study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
+use zsim::study::sweep::Measure;
 
 /// The report on a spring.
 pub(super) fn report(report: &SpringReport) -> String {
@@ -84,7 +85,29 @@ pub(super) fn design(study: &DesignStudy) -> String {
                   mass of the wire. Simulated: view (field of view, deg), rate (maximum, deg/s), gap (smallest gap between \
                   coils, mm), and the margins of clash, yield and fatigue; - if the strength is unknown. pareto.csv has \
                   all figures, rejected.csv why others are no candidates.";
-    format!("{text}\n{}\n{}", table(&header, &rows, true), wrapped(legend, ""))
+    format!("{text}\n{}\n{}{}", table(&header, &rows, true), wrapped(legend, ""), journeys(study))
+}
+
+/// The table of the journeys; empty without any.
+fn journeys(study: &DesignStudy) -> String {
+    let measures: Vec<Measure> =
+        study.journey_measures().into_iter().filter(|measure| *measure != Measure::CoilContactS).collect();
+    if measures.is_empty() {
+        return String::new();
+    }
+    let with_unit = |measure: &Measure| match measure.unit().0 {
+        "1" => measure.short().to_owned(),
+        unit => format!("{}, {unit}", measure.short()),
+    };
+    let header: Vec<String> = ["in a journey".to_owned()].into_iter().chain(measures.iter().map(with_unit)).collect();
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let row = |design: &VerifiedDesign| {
+        let figure =
+            |measure: &Measure| design.journey.get(measure).map_or("-".to_owned(), |x| digits(x * measure.unit().1));
+        [design.candidate.coil.label()].into_iter().chain(measures.iter().map(figure)).collect()
+    };
+    let rows: Vec<Vec<String>> = study.candidates.iter().map(row).collect();
+    format!("\n{}", table(&header, &rows, true))
 }
 
 fn candidate_row(design: &VerifiedDesign) -> Vec<String> {
@@ -100,7 +123,7 @@ fn candidate_row(design: &VerifiedDesign) -> Vec<String> {
         number(margins.clash, 2),
         number(margins.gap_mm, 2),
         number(margins.yielding, 2),
-        number(design.fatigue_margin, 2),
+        number(design.simulated.fatigue_margin, 2),
     ]
 }
 

@@ -10,7 +10,8 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use zsim::spec::{Kind, find, parse};
+use zsim::spec::{Kind, SpecError, find, parse};
+use zsim::study::spring::design::DesignSpec;
 use zsim::study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
@@ -119,7 +120,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 pub(super) fn plan_of(name: &str) -> anyhow::Result<Plan> {
     let source = find(Kind::Study, name)?;
     let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Plan::new(&stem, &parse(&source)?, &source)?)
+    let spec = parse(&source).map_err(|error| match parse::<DesignSpec>(&source) {
+        Ok(_) => {
+            SpecError::plain(&source.name, format!("it is a spring search, not a sweep: zsim spring design {name}"))
+        }
+        Err(_) => error,
+    })?;
+    Ok(Plan::new(&stem, &spec, &source)?)
 }
 
 fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Completion> {

@@ -30,6 +30,12 @@ impl<'a> CoilGaps<'a> {
         Self { springs: springs.iter().map(|mounted| (mounted, mounted.spring.state())).collect() }
     }
 
+    /// The smallest gap of each spring with the head at a pose; `None` as for [`smallest`](Self::smallest).
+    pub fn of_each(&mut self, base_from_head: &Pose) -> Vec<Option<CoilGap>> {
+        let gap = |(mounted, state): &mut (&MountedSpring, SpringState)| mounted.coil_gap(state, base_from_head);
+        self.springs.iter_mut().map(|spring| gap(spring).ok().flatten()).collect()
+    }
+
     /// The smallest gap between neighbouring coils of the springs with the head at a pose.
     ///
     /// `None` without a coil, or where a segmented spring has no equilibrium. Poses in sequence are faster than others.

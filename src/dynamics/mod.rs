@@ -17,6 +17,7 @@ mod contact;
 mod contact_steps;
 mod cord;
 mod elements;
+mod end_loads;
 mod engine;
 mod error;
 mod float;
@@ -44,6 +45,7 @@ pub use elements::{
     CableSpec, CordSpec, CordStiffnessSpec, ElementSpec, FloatSpec, SpringElementSpec, SpringMassSpec,
     UniversalJointSpec,
 };
+pub use end_loads::{EndLoad, SpringEndLoads};
 pub use error::DynamicsError;
 pub use head::HeadModel;
 pub use modes::natural_frequencies_hz;

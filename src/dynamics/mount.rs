@@ -11,7 +11,7 @@ use super::joint::UniversalJoint;
 use super::mounted_spring::{MountedSpring, WireMass};
 use super::spec::{DampingSpec, EndStopSpec, HoldSpec, LinkageSpec};
 use super::statics::{NoEquilibrium, Statics};
-use crate::elasticity::{ElasticityError, Matrix6, SpringDesign, SpringSpec};
+use crate::elasticity::{ElasticityError, Matrix6, SpringDesign, SpringSpec, check_buckling};
 use crate::geometry::{Pose, Rotation, gravity_in_world};
 use crate::spec::{Source, SpecError};
 
@@ -234,11 +234,20 @@ impl CompliantMount<'_> {
                 }
             }
             if change_n <= tolerance_n {
+                self.check_loads(&loads_n)?;
                 self.set_reference(&mut law, &rest);
                 return Ok((law, rest, stiffness));
             }
         }
         Err(NoEquilibrium::Unstable)
+    }
+
+    /// Checks that the loads are within the range of the force laws of the coils.
+    fn check_loads(&self, loads_n: &[f64]) -> Result<(), ElasticityError> {
+        self.springs.iter().zip(loads_n).try_for_each(|(spring, load_n)| match &spring.design {
+            SpringDesign::Coil(coil) => check_buckling(coil, *load_n),
+            SpringDesign::Stiffness { .. } => Ok(()),
+        })
     }
 
     fn on_straight_spring(&self, law: &ForceLaw) -> Pose {

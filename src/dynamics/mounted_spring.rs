@@ -76,6 +76,12 @@ impl WireMass {
 }
 
 impl MountedSpring {
+    /// Mass of the wire, kg; 0 if it is neglected.
+    #[cfg(test)]
+    pub fn wire_mass_kg(&self) -> f64 {
+        self.mass.map_or(0.0, |mass| mass.mass_kg)
+    }
+
     /// Adds the wrench of the spring and the forces of the wire.
     ///
     /// # Errors

@@ -101,6 +101,14 @@ pub enum ElasticityError {
         /// Length under the load, mm.
         length_mm: f64,
     },
+    /// The axial load is above the range of the force law.
+    #[error(
+        "an axial load of {load_n:.2} N on the spring is above 80 % of its buckling load (top guided), where the force law ends"
+    )]
+    NearBuckling {
+        /// Axial load, N.
+        load_n: f64,
+    },
     /// The tension is beyond the range of the force law.
     #[error(
         "a pull of {pull_n:.1} N stretches the spring to {length_mm:.0} mm, which is beyond the range of the force law"

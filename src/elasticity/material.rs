@@ -54,6 +54,24 @@ const ZIMMERLI_MPA: (f64, f64) = (241.0, 379.0);
 const TORSIONAL_STRENGTH: f64 = 0.67;
 
 impl Material {
+    /// Name as in specs and catalogues.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Material::SpringSteel => "spring_steel",
+            Material::Stainless => "stainless",
+            Material::Moduli { .. } => "moduli",
+        }
+    }
+
+    /// Name in words.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Material::SpringSteel => "spring steel (patented or music wire)",
+            Material::Stainless => "stainless steel 302 (1.4310)",
+            Material::Moduli { .. } => "given by its moduli",
+        }
+    }
+
     /// The elastic moduli.
     pub fn moduli(&self) -> Moduli {
         let (youngs_gpa, shear_gpa) = match self {

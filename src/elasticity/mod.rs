@@ -29,7 +29,7 @@ mod solutions;
 mod spec;
 mod spring;
 
-pub use buckling::buckling_load_n;
+pub use buckling::{VALID_BUCKLING_MARGIN, buckling_load_n, check_buckling};
 pub use coil::{Coil, Moduli, Winding};
 pub use deformation::{Deformation, blocks, split, stack};
 pub use element::Element;

@@ -82,6 +82,26 @@ pub enum HandSpec {
 }
 
 impl EndsSpec {
+    /// Name as in specs and catalogues.
+    pub fn key(self) -> &'static str {
+        match self {
+            EndsSpec::ActiveOnly => "active_only",
+            EndsSpec::Open => "open",
+            EndsSpec::Closed => "closed",
+            EndsSpec::ClosedGround => "closed_ground",
+        }
+    }
+
+    /// Name in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            EndsSpec::ActiveOnly => "without ends",
+            EndsSpec::Open => "open ends",
+            EndsSpec::Closed => "closed ends",
+            EndsSpec::ClosedGround => "closed and ground ends",
+        }
+    }
+
     /// Number of inactive coils.
     pub fn inactive_coils(self) -> f64 {
         match self {

@@ -29,6 +29,7 @@ mod base_imu;
 mod cloud;
 mod container;
 mod duplicates;
+mod ending;
 mod error;
 mod estimate_messages;
 mod extrinsics;
@@ -60,6 +61,7 @@ mod writer;
 
 pub use base_imu::BaseImuRecord;
 pub use cloud::CloudPoint;
+pub use ending::other_format;
 pub use error::RecordingError;
 pub use estimate_messages::{Diagnostic, DiagnosticLevel, EstimateMessages, EstimateTopic};
 pub use extrinsics::FoundCalibration;

@@ -33,7 +33,7 @@ pub use metrics::{
 };
 pub use names::{axis_label, quantity_name};
 pub use profile::timing_table;
-pub use quantity::length;
+pub use quantity::{digits, length};
 pub use sensors::{NoiseMetrics, SensorMetrics, noise_sources};
 pub use table::{markdown, summary, table};
 pub use wrap::wrapped;

@@ -36,7 +36,7 @@ pub(super) fn percent(fraction: f64) -> String {
 }
 
 /// Formats a number with three significant digits and without an exponent.
-pub(super) fn digits(number: f64) -> String {
+pub fn digits(number: f64) -> String {
     if number == 0.0 || !number.is_finite() {
         return number.to_string();
     }

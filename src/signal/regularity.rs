@@ -92,7 +92,8 @@ impl Regularity {
         let mut intervals: Vec<f64> = stamps_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let without_losses = Self::about_line(stamps_s.iter().copied().zip(0..).map(|(s, k)| (f64::from(k), s)));
         intervals.sort_by(f64::total_cmp);
-        let typical = intervals.get(intervals.len() / 2).copied().unwrap_or_default();
+        // The lower median: pairs have as many intervals of zero as others.
+        let typical = intervals.get(intervals.len().saturating_sub(1) / 2).copied().unwrap_or_default();
         let comes_in_bursts = typical < BURST_INTERVAL_RATIO * intervals.iter().sum::<f64>() / intervals.len() as f64;
         intervals.retain(|dt| *dt > 0.0);
         if intervals.len() < 2 {

@@ -52,6 +52,7 @@ pub mod scene;
 mod sensor_models;
 pub mod spring;
 pub mod sweep;
+mod threads;
 mod true_clock;
 mod truth_cursor;
 mod viewer_files;

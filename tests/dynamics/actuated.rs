@@ -173,13 +173,13 @@ fn invalid_motors_are_refused_with_their_line() {
 
 #[test]
 fn rigid_mounts_have_no_gains_and_no_spring() {
-    use zsim::study::gains::{GainPlan, gain_curves};
+    use zsim::study::gains::{GainPlan, GainWatch, gain_curves};
     for (name, because) in
         [("spinning", "a motor turns the head"), ("nodding", "a motor turns the head"), ("trawling", "screwed")]
     {
         let head: HeadModel = shipped(name);
         assert!(head.linear_modes().is_empty() && head.linear().is_none());
-        let error = gain_curves(&head, &GainPlan::default(), &|_| ()).unwrap_err();
+        let error = gain_curves(&head, &GainPlan::default(), GainWatch::silent()).unwrap_err();
         let message = error.to_string();
         assert!(
             error.is_invalid_input() && message.contains(because) && message.contains("nothing to characterise"),

@@ -5,7 +5,7 @@ use zsim::dynamics::{DampingSpec, HeadModel, HeadSimulation, LinkageSpec, MotorS
 use zsim::motion::Axis;
 use zsim::random::Seed;
 use zsim::spec::{Kind, names};
-use zsim::study::gains::{GainPlan, gain_curve};
+use zsim::study::gains::{GainPlan, GainWatch, gain_curve};
 
 /// Names of the heads with a flexible linkage.
 fn sprung() -> Vec<String> {
@@ -85,7 +85,7 @@ fn small_swing_gains_of_shipped_heads_agree_with_the_closed_form() {
     for name in sprung().iter().filter(|name| *name != "handheld") {
         let head = damped(name);
         for axis in [Axis::Pitch, Axis::Z] {
-            let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
+            let curve = gain_curve(&head, axis, &plan, GainWatch::silent()).unwrap();
             let coherent = curve.points.iter().filter(|p| p.coherence > 0.95);
             for p in coherent.clone() {
                 let allowed = f64::max(0.03 * p.gain_model, 3.0 * p.gain_sigma).max(1e-3);

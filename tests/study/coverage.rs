@@ -73,6 +73,19 @@ fn a_180_degree_scanner_spun_about_its_middle_ray_covers_a_hemisphere() {
 }
 
 #[test]
+fn the_coverage_of_a_second_is_that_of_its_part_of_a_turn() {
+    // A quarter of a turn in a second is half of the hemisphere that half a turn covers, plus the cells on its border.
+    let plan = CoveragePlan { duration_s: 8.0, ..CoveragePlan::default() };
+    let quarter = coverage_of(0.25, &lidar("lms291_0_5deg"), &plan).fraction_in_1s.unwrap();
+    assert!((0.25..0.25 + 0.05).contains(&quarter), "{quarter}");
+    // At rest each second observes the same.
+    let at_rest = coverage_of(0.0, &lidar("utm30lx"), &plan);
+    assert_eq!(at_rest.fraction_in_1s, Some(at_rest.fraction_seen));
+    let short = CoveragePlan { duration_s: 0.9, ..CoveragePlan::default() };
+    assert_eq!(coverage_of(0.25, &lidar("utm30lx"), &short).fraction_in_1s, None);
+}
+
+#[test]
 fn beam_density_is_inverse_to_the_sine_of_the_angle_from_the_spin_axis() {
     let lidar = lidar("utm30lx");
     let coverage = coverage_of(0.97, &lidar, &CoveragePlan { duration_s: 40.0, ..CoveragePlan::default() });

@@ -3,7 +3,7 @@
 use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, LinkageSpec, load};
 use zsim::motion::Axis;
 use zsim::spec::{Source, parse};
-use zsim::study::gains::{GainCurve, GainPlan, GainPoint, csv, gain_curve, gain_curves, swing_study};
+use zsim::study::gains::{GainCurve, GainPlan, GainPoint, GainWatch, csv, gain_curve, gain_curves, swing_study};
 
 /// The handheld head with one damping ratio for all modes.
 fn handheld(ratio: f64) -> HeadModel {
@@ -32,7 +32,7 @@ fn worst(curve: &GainCurve) -> (f64, &GainPoint) {
 
 #[test]
 fn small_swing_gains_of_all_six_axes_agree_with_the_closed_form() {
-    let curves = gain_curves(&handheld(0.02), &plan(), &|_| ()).unwrap();
+    let curves = gain_curves(&handheld(0.02), &plan(), GainWatch::silent()).unwrap();
     assert_eq!(curves.len(), 6);
     for curve in &curves {
         let (peak, model) = (curve.peak.unwrap(), curve.peak_model.unwrap());
@@ -54,7 +54,7 @@ fn a_lightly_damped_head_agrees_with_the_closed_form_within_1_percent() {
     let rocking_hz = head.linear_modes()[0].frequency_hz;
     let plan = GainPlan { up_to_hz: 3.0, period_s: Some(20.0), ..plan() };
     for axis in [Axis::Pitch, Axis::X] {
-        let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
+        let curve = gain_curve(&head, axis, &plan, GainWatch::silent()).unwrap();
         for point in curve.points.iter().filter(|p| (p.freq_hz / (2.0 * rocking_hz) - 1.0).abs() < 0.1) {
             assert!((point.gain / point.gain_model - 1.0).abs() < 0.01, "{axis:?}: {point:?}");
         }
@@ -66,7 +66,7 @@ fn halving_the_time_step_changes_the_peak_by_less_than_1_percent() {
     let head = handheld(0.06);
     let plan = GainPlan { up_to_hz: 5.0, ..plan() };
     let peak = |step_s: f64| {
-        gain_curve(&head, Axis::Pitch, &GainPlan { step_s, ..plan.clone() }, &|_| ()).unwrap().peak.unwrap()
+        gain_curve(&head, Axis::Pitch, &GainPlan { step_s, ..plan.clone() }, GainWatch::silent()).unwrap().peak.unwrap()
     };
     let (whole, half) = (peak(1e-3), peak(0.5e-3));
     assert!((whole.gain / half.gain - 1.0).abs() < 0.01, "{whole:?} {half:?}");
@@ -77,7 +77,7 @@ fn specific_force_agrees_with_the_closed_form() {
     let head = handheld(0.06);
     let plan = GainPlan { acceleration: AccelerationKind::SpecificForce, up_to_hz: 5.0, ..plan() };
     for axis in [Axis::X, Axis::Y] {
-        let curve = gain_curve(&head, axis, &plan, &|_| ()).unwrap();
+        let curve = gain_curve(&head, axis, &plan, GainWatch::silent()).unwrap();
         let (deviation, point) = worst(&curve);
         assert!(deviation < 1.0, "{axis:?}: {point:?}");
     }
@@ -89,7 +89,7 @@ fn gain_curves_do_not_depend_on_the_number_of_threads() {
     let plan = GainPlan { up_to_hz: 2.0, period_s: Some(2.0), ..plan() };
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        csv(&pool.install(|| gain_curves(&head, &plan, &|_| ()).unwrap()))
+        csv(&pool.install(|| gain_curves(&head, &plan, GainWatch::silent()).unwrap()))
     };
     let text = with(1);
     assert_eq!(text, with(2));
@@ -135,7 +135,8 @@ fn a_large_swing_raises_the_resonance_of_an_upright_head_and_lowers_that_of_a_ha
     let plan = GainPlan { up_to_hz: 4.0, realisations: 6, ..plan() };
     for (is_hanging, sign) in [(false, 1.0), (true, -1.0)] {
         let stiffness = if is_hanging { 0.6 * weight_nm } else { 1.6 * weight_nm };
-        let study = swing_study(&on_a_joint(stiffness, is_hanging), Axis::X, &[0.2, 12.0], &plan, &|_| ()).unwrap();
+        let study =
+            swing_study(&on_a_joint(stiffness, is_hanging), Axis::X, &[0.2, 12.0], &plan, GainWatch::silent()).unwrap();
         let [small, large] = study.points[..] else { panic!("{study:?}") };
         let sigma = large.swing_rms_deg.to_radians();
         let shift = sign * weight_nm / (4.0 * (stiffness - sign * weight_nm)) * sigma * sigma;
@@ -147,7 +148,7 @@ fn a_large_swing_raises_the_resonance_of_an_upright_head_and_lowers_that_of_a_ha
 #[test]
 fn a_large_swing_shifts_the_resonance_and_reduces_the_coherence() {
     let plan = GainPlan { up_to_hz: 3.0, realisations: 3, ..plan() };
-    let study = swing_study(&handheld(0.06), Axis::Pitch, &[0.1, 15.0], &plan, &|_| ()).unwrap();
+    let study = swing_study(&handheld(0.06), Axis::Pitch, &[0.1, 15.0], &plan, GainWatch::silent()).unwrap();
     let [small, large] = study.points[..] else { panic!("{study:?}") };
     let (at_small, at_large) = (small.peak.unwrap(), large.peak.unwrap());
     assert!((at_small.freq_hz / study.peak_model.unwrap().freq_hz - 1.0).abs() < 0.005);

@@ -1,15 +1,17 @@
 //! Spring design by search.
 
 use zsim::dynamics::{HeadModel, LinkageSpec};
+use zsim::random::Seed;
 use zsim::sensors::Lidar;
+use zsim::simulation::{Run, Scenario, Simulation};
 use zsim::spec::{Kind, Source, find, parse};
-use zsim::study::coverage::CoveragePlan;
+use zsim::study::coverage::{CoveragePlan, coverage};
 use zsim::study::spring::design::{
     BuildLimitsSpec, CoilDesign, DesignSearch, DesignSpec, DesignStudy, SpaceSpec, WireStock, csv, pareto_figure,
     rejected_csv,
 };
-use zsim::study::spring::simulated;
-use zsim::study::sweep::pareto_set;
+use zsim::study::spring::{MISSION_HOURS, simulated};
+use zsim::study::sweep::{Measure, pareto_set};
 
 fn load(name: &str) -> (DesignSpec, Source) {
     let source = find(Kind::Study, name).unwrap();
@@ -111,6 +113,80 @@ fn files_that_a_search_names_are_relative_to_its_file() {
     assert!(error.contains("design.ron:3:12"), "the position in the file of the search: {error}");
 }
 
+/// A search in a catalogue of four springs by journeys of 12 s with two seeds.
+fn by_outcome(goals: &str, limits: &str) -> Result<DesignStudy, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let catalogue = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material\n\
+                     usual,25.0,3.0,12.0,120.0,spring_steel\n\
+                     stiff,32.0,3.5,8.5,125.0,spring_steel\n\
+                     short,20.0,2.5,12.5,63.0,spring_steel\n\
+                     falls,20.0,1.5,20.0,160.0,spring_steel\n";
+    std::fs::write(folder.path().join("springs.csv"), catalogue).unwrap();
+    let text = format!(
+        "(head: \"handheld\", lidar: \"utm30lx\", shake: (pitch_deg: 2.0), space: catalogue(\"springs.csv\"),
+          journey: (scene: \"mocap_room\", motion: \"hand\", imu: \"3dm_gx2\", clock: \"drifting\", estimator: \"default\",
+            duration_s: 12.0, seeds: [1, 2], designs: 8, time_limit_s: 60.0),
+          goals: [{goals}], limits: [{limits}], evaluations: 1, candidates: 4, seed: 1)"
+    );
+    let path = folder.path().join("design.ron");
+    std::fs::write(&path, text).unwrap();
+    let source = Source::read(&path).unwrap();
+    let spec: DesignSpec = parse(&source).unwrap();
+    let search = DesignSearch::new(&spec, &source).map_err(|error| error.to_string())?;
+    Ok(search.run(&|_| ()).unwrap())
+}
+
+#[test]
+fn springs_are_compared_by_their_journeys() {
+    let goals =
+        "(measure: position_rmse_m, aim: least), (measure: gyro_range_left, aim: most), (measure: sag_mm, aim: least)";
+    let study = by_outcome(goals, "").unwrap();
+    assert_eq!((study.evaluated, study.feasible), (4, 3), "{:?}", study.rejected);
+    let names = |study: &DesignStudy| -> Vec<String> {
+        study.candidates.iter().map(|design| design.candidate.coil.name.clone()).collect()
+    };
+    // The stiff spring swings least and sags least, so it is in every Pareto set of these goals.
+    assert!(names(&study).contains(&"stiff".to_owned()), "{:?}", names(&study));
+    let costs: Vec<_> = study.candidates.iter().map(|design| design.candidate.costs.clone()).collect();
+    assert_eq!(pareto_set(&costs).len(), costs.len());
+    // The figures are those of a simulation of the same journeys.
+    for design in &study.candidates {
+        let range_left = |seed: u64| {
+            let scenario = Scenario { duration_s: 12.0, seed: Seed(seed), ..Scenario::in_scene("mocap_room") };
+            let mut run = Run::load(&scenario).unwrap();
+            run.head.spec = head_on(&study.spec, &design.candidate.coil).0;
+            let simulation = Simulation::build(run).unwrap();
+            let plan = CoveragePlan { duration_s: 7.0, ..CoveragePlan::default() };
+            let swing = coverage(simulation.head(), simulation.motion(), simulation.lidar(), &plan, |_| ()).unwrap();
+            1.0 - swing.gyro.most_deg_per_s / 600.0
+        };
+        let left = design.journey[&Measure::GyroRangeLeft];
+        assert!((left - 0.5 * (range_left(1) + range_left(2))).abs() < 1e-12, "{left}");
+        let error_m = design.journey[&Measure::PositionRmseM];
+        assert!(error_m > 0.0 && error_m < 0.02, "{error_m}");
+    }
+    let header = csv(&study).lines().next().unwrap().to_owned();
+    assert!(header.ends_with("journey_position_rmse_m,journey_status,journey_gyro_range_left,journey_coil_contact_s"));
+}
+
+#[test]
+fn a_limit_of_the_journey_rejects_springs_and_a_goal_without_a_journey_is_an_error() {
+    let goals = "(measure: fraction_seen_1s, aim: most)";
+    let open = by_outcome(goals, "").unwrap();
+    let best = open.candidates.first().unwrap();
+    let (name, most) = (&best.candidate.coil.name, best.journey[&Measure::FractionSeen1S]);
+    // A limit below the best spring's coverage rejects it, with its value.
+    let limited = by_outcome(goals, &format!("(measure: fraction_seen_1s, most: {})", 0.999 * most)).unwrap();
+    let rejection = limited.rejections.iter().find(|rejection| rejection.coil.name == *name).unwrap();
+    assert_eq!(
+        (rejection.limit.as_str(), rejection.value, rejection.simulated),
+        ("fraction_seen_1s", Some(most), true)
+    );
+    assert!(limited.candidates.iter().all(|design| design.candidate.coil.name != *name));
+    let error = by_outcome("(measure: wall_s, aim: least)", "").unwrap_err();
+    assert!(error.contains("wall_s cannot be a goal"), "{error}");
+}
+
 #[test]
 fn an_invalid_search_is_an_error_with_the_reason() {
     let (spec, source) = load("spring_design");
@@ -120,6 +196,9 @@ fn an_invalid_search_is_an_error_with_the_reason() {
         DesignSearch::new(&spec, &source).map(|_| ()).unwrap_err().to_string()
     };
     assert!(wrong(|s| s.goals.clear()).contains("at least one goal"));
+    assert!(wrong(|s| s.shake.frequency_hz = Some(0.0)).contains("expected a finite number above 0"));
+    let no_journey = wrong(|s| s.goals[0].measure = Measure::PositionRmseM);
+    assert!(no_journey.contains("add `journey:"), "{no_journey}");
     assert!(wrong(|s| s.head = "rigid".to_owned()).contains("no spring"));
     assert!(wrong(|s| s.head = "nowhere".to_owned()).contains("no such head"));
     let bounds = |s: &mut DesignSpec| {
@@ -161,7 +240,8 @@ fn no_candidate_of_three_briefs_clashes_and_all_can_be_ordered() {
             // Simulated anew, twice as long as in the verification.
             let (head, head_source) = head_on(&spec, coil);
             let plan = CoveragePlan { from_s: 5.0, duration_s: 25.0, ..CoveragePlan::default() };
-            let (metrics, coverage) = simulated(&head, &head_source, &spec.shake, &lidar, &plan).unwrap();
+            let (metrics, coverage) =
+                simulated(&head, &head_source, &spec.shake, &lidar, &plan, MISSION_HOURS).unwrap();
             let (gap_mm, label) = (metrics.margins.gap_mm.unwrap(), coil.label());
             assert!(gap_mm > 0.0 && metrics.margins.clash.unwrap() > 1.1, "{name} {label}: {metrics:?}");
             // Even a uniform bend of the spring by the largest tilt of the head leaves a gap on the inner side.
@@ -241,7 +321,7 @@ fn a_material_without_strength_is_searched_and_its_unchecked_limits_are_named() 
     let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
     let [design] = &study.candidates[..] else { panic!("{:?}", study.rejected) };
     assert_eq!(design.unchecked, ["yield_margin", "stress_share", "fatigue_margin"]);
-    assert_eq!((design.fatigue_margin, design.simulated.margins.yielding), (None, None));
+    assert_eq!((design.simulated.fatigue_margin, design.simulated.margins.yielding), (None, None));
 }
 
 #[test]

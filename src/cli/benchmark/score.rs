@@ -1,10 +1,11 @@
 //! `zsim benchmark score`: the errors of systems on the recordings of a suite.
 
-use super::scores::{Score, System, figures, page, runs_csv, systems_table};
+use super::scores::{Score, System, failures, figures, page, runs_csv, systems_table};
 use super::suite::Suite;
 use crate::cli::arguments::Global;
 use crate::cli::usage::Usage;
 use crate::cli::{Completion, output, trajectory_file};
+use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim::evaluation::{Pairs, TrajectoryErrors};
@@ -65,8 +66,27 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let figures = figures(&suite, &systems, arguments.min_coverage);
     replace_text(&folder.join("scores.json"), &(serde_json::to_string_pretty(&figures)? + "\n"))?;
     replace_text(&folder.join("scores.html"), &page(&suite, &systems, arguments.min_coverage))?;
-    output::print_result(global, &systems_table(&systems), figures, Some(&folder.join("scores.html")))?;
+    let text = systems_table(&systems) + &failures(&suite, &systems);
+    output::print_result(global, &text, figures, Some(&folder.join("scores.html")))?;
+    for (name, folder) in &arguments.system {
+        note_unused(name, folder, &suite)?;
+    }
     Ok(Completion::Done)
+}
+
+/// Notes the trajectories of a system that have the name of no recording.
+fn note_unused(system: &str, folder: &Path, suite: &Suite) -> anyhow::Result<()> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
+    let names = entries.flatten().map(|entry| PathBuf::from(entry.file_name()));
+    let of_recording = |name: &Path| suite.recordings.iter().any(|item| Some(item.name.as_ref()) == name.file_stem());
+    let mut unused: Vec<PathBuf> =
+        names.filter(|name| name.extension().is_some_and(|ending| ending == "tum") && !of_recording(name)).collect();
+    unused.sort();
+    for name in unused {
+        let name = output::printable_name(&name.display().to_string());
+        eprintln!("note: {system}: {name} has the name of no recording and is not used");
+    }
+    Ok(())
 }
 
 /// The errors of the trajectory in the file `path`, or why there are none.

@@ -30,6 +30,9 @@ const FIGURES: [(&str, Figure); 4] = [
     ("drift/min", |errors| errors.drift.map(|drift| drift.position_m_per_min)),
 ];
 
+/// Maximum number of failures in the terminal.
+const MAX_FAILURES: usize = 12;
+
 impl Score {
     /// A figure; infinite if the recording failed, `None` if the trajectory is too short for it.
     fn figure(&self, of: Figure) -> Option<f64> {
@@ -73,6 +76,24 @@ fn systems_header() -> Vec<&'static str> {
 /// The table of the systems for the terminal.
 pub(super) fn systems_table(systems: &[System]) -> String {
     report::table(&systems_header(), &systems.iter().map(System::row).collect::<Vec<_>>(), true)
+}
+
+/// Why trajectories count as failed, for the terminal; empty if none does.
+pub(super) fn failures(suite: &Suite, systems: &[System]) -> String {
+    let of_system = |system: &System| {
+        let scores = suite.recordings.iter().zip(&system.scores);
+        let failed = scores.filter_map(|(item, score)| Some((item.name.clone(), score.failure.clone()?)));
+        failed.map(|(item, failure)| format!("  {}, {item}: {failure}\n", system.name)).collect::<Vec<_>>()
+    };
+    let lines: Vec<String> = systems.iter().flat_map(of_system).collect();
+    let shown = lines.iter().take(MAX_FAILURES).map(String::as_str).collect::<String>();
+    match lines.len() {
+        0 => String::new(),
+        count if count > MAX_FAILURES => {
+            format!("\nfailed:\n{shown}  and {} more, in scores.csv\n", count - MAX_FAILURES)
+        }
+        _ => format!("\nfailed:\n{shown}"),
+    }
 }
 
 /// The errors by key, and the failure.

@@ -33,12 +33,14 @@ pub(super) struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// List the specs that are built into zsim
+    #[command(after_help = "Example:\n  zsim spec list head")]
     List {
         /// List only this kind
         #[arg(value_enum)]
         kind: Option<KindArgument>,
     },
     /// Print the text of a spec
+    #[command(after_help = "Example:\n  zsim spec show head handheld > my_head.ron")]
     Show {
         /// The kind
         #[arg(value_enum)]
@@ -49,12 +51,14 @@ enum Command {
     /// Print the JSON schema of a kind of spec
     ///
     /// RON and JSON have the same structure here: RON's (a: 1) is JSON's {"a": 1}, Variant(x) is {"Variant": x}.
+    #[command(after_help = "Example:\n  zsim spec schema head > head.schema.json")]
     Schema {
         /// The kind
         #[arg(value_enum)]
         kind: KindArgument,
     },
     /// Print every key of a kind of spec with type, unit, default and range, as Markdown
+    #[command(after_help = "Example:\n  zsim spec reference head > head.md")]
     Reference {
         /// The kind
         #[arg(value_enum)]

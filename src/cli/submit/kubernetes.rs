@@ -17,6 +17,27 @@ const REPEATS: u64 = 3;
 /// Maximum number of pods at the same time; the scheduler starts them as nodes have room.
 const MAX_PARALLEL: u64 = 1000;
 
+/// The name of a persistent volume claim: a DNS subdomain (RFC 1123).
+pub(super) fn claim(text: &str) -> Result<String, String> {
+    let is_label = |label: &str| {
+        let is_inner = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        !label.is_empty() && label.chars().all(is_inner) && !label.starts_with('-') && !label.ends_with('-')
+    };
+    if text.len() <= 253 && text.split('.').all(is_label) {
+        return Ok(text.to_owned());
+    }
+    Err("expected lower-case letters, digits, dots and inner hyphens, at most 253".to_owned())
+}
+
+/// The name of a container image.
+pub(super) fn image(text: &str) -> Result<String, String> {
+    let is_valid = |c: char| c.is_ascii_alphanumeric() || "._-/:@+".contains(c);
+    if !text.is_empty() && text.chars().all(is_valid) {
+        return Ok(text.to_owned());
+    }
+    Err("expected the name of an image, such as registry.example/zsim:1".to_owned())
+}
+
 /// Writes the manifest; returns its path.
 pub(super) fn write(submission: &Submission, image: &str, claim: &str) -> anyhow::Result<PathBuf> {
     let manifest = manifest(submission, image, claim)?;
@@ -86,5 +107,15 @@ mod tests {
         assert_eq!(job_name("ä/"), "zsim");
         let long = job_name(&"a".repeat(200));
         assert!(long.len() <= MAX_NAME_LENGTH && long.starts_with("zsim-aaa"), "{long}");
+    }
+
+    #[test]
+    fn invalid_claims_and_images_are_refused() {
+        assert!(["data", "data-1.lab", "0"].iter().all(|name| claim(name).is_ok()));
+        assert!(
+            ["", "Data", "a_b", "-a", "a-", "a..b", "a/b", &"a".repeat(254)].iter().all(|name| claim(name).is_err())
+        );
+        assert!(["zsim:1", "registry.example:5000/lab/zsim@sha256:0a"].iter().all(|name| image(name).is_ok()));
+        assert!(["", "zsim 1", "zsim:1\n"].iter().all(|name| image(name).is_err()));
     }
 }

@@ -44,10 +44,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "OPTIONS", default_value = "", allow_hyphen_values = true, conflicts_with = "kubernetes")]
     sbatch: String,
     /// Image whose entry point is zsim, of the same version as this program
-    #[arg(long, value_name = "IMAGE", conflicts_with = "slurm")]
+    #[arg(long, value_name = "IMAGE", conflicts_with = "slurm", value_parser = kubernetes::image)]
     image: Option<String>,
     /// Persistent volume claim with the folder that contains DIR; it is mounted at the same path
-    #[arg(long, value_name = "NAME", conflicts_with = "slurm")]
+    #[arg(long, value_name = "NAME", conflicts_with = "slurm", value_parser = kubernetes::claim)]
     claim: Option<String>,
     /// Write DIR/slurm/array.sh or DIR/kubernetes/job.json and do not submit it
     #[arg(long)]

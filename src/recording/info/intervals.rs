@@ -141,8 +141,10 @@ mod tests {
         in_order.sort_unstable();
         let found = statistics(in_order.into_iter());
         assert_eq!((found.missing, found.pattern), (0, Some(StampPattern::Delayed)));
-        let found = statistics((0..4000).map(|k| k / 4 * 40));
-        assert_eq!((found.missing, found.pattern), (0, Some(StampPattern::Bursts)));
+        for in_burst in [2, 4] {
+            let found = statistics((0..4000).map(|k| k / in_burst * 10 * in_burst));
+            assert_eq!((found.missing, found.pattern), (0, Some(StampPattern::Bursts)), "{in_burst}");
+        }
     }
 
     #[test]

@@ -47,7 +47,7 @@ pub fn coverage(
     let track = SwingTrack::record(head, motion, plan, watch)?;
     let turning = track.turning_points();
     let mut sphere = Sphere::default();
-    let mut over_time = Vec::new();
+    let (mut over_time, mut seconds) = (Vec::new(), Vec::new());
     let mut sweeps = Sweeps::default();
     let scans = (plan.duration_s / lidar.period_s()).floor() as usize;
     let mut next = turning.iter().copied().peekable();
@@ -61,7 +61,12 @@ pub fn coverage(
             let heading_from_laser = track.heading_from_laser(start_s + beam.offset_s);
             sphere.count_beam(&(heading_from_laser * (laser_rotation * beam.direction_in_laser)));
         }
-        over_time.push((start_s + lidar.period_s(), sphere.observed_fraction()));
+        let end_s = start_s + lidar.period_s();
+        over_time.push((end_s, sphere.observed_fraction()));
+        // The end of a scan may be below a whole number of seconds by rounding.
+        if end_s + 1e-9 >= (seconds.len() + 1) as f64 {
+            seconds.push(sphere.end_second());
+        }
     }
     let time_to = |share_of_final: f64| {
         let target = share_of_final * sphere.observed_fraction();
@@ -70,6 +75,7 @@ pub fn coverage(
     let observed_s = scans as f64 * lidar.period_s();
     Ok(Coverage {
         fraction_seen: sphere.observed_fraction(),
+        fraction_in_1s: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
         fraction_in_a_sweep: sweeps.mean(|s| s.fraction),
         sweep_s: (turning.len() > 1).then(|| (turning[turning.len() - 1] - turning[0]) / (turning.len() - 1) as f64),
         density_in_a_sweep_per_sr: sweeps.mean(|s| s.density_per_sr),

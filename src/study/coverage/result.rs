@@ -27,6 +27,8 @@ impl Default for CoveragePlan {
 pub struct Coverage {
     /// Observed fraction of the sphere.
     pub fraction_seen: f64,
+    /// Mean fraction of the sphere observed per second; `None` for an observation of less than a second.
+    pub fraction_in_1s: Option<f64>,
     /// Mean fraction of the sphere observed per sweep, from one turning point of the swing to the next; `None` without a
     /// complete sweep.
     pub fraction_in_a_sweep: Option<f64>,
@@ -88,4 +90,11 @@ pub struct GyroUsage {
     pub p99_deg_per_s: f64,
     /// Fraction of the time in which at least one axis is saturated.
     pub saturated: f64,
+}
+
+impl GyroUsage {
+    /// Fraction of the range above the maximum rate; negative if the rate exceeds the range.
+    pub fn range_left(&self) -> f64 {
+        1.0 - self.most_deg_per_s / self.limit_deg_per_s
+    }
 }

@@ -15,13 +15,16 @@ pub(super) struct Sphere {
     beams: Vec<u32>,
     /// Beams per cell in the current sweep.
     in_sweep: Vec<u32>,
+    /// Whether a cell has a beam in the current second.
+    in_second: Vec<bool>,
     /// Number of cells with a beam.
     observed: usize,
 }
 
 impl Default for Sphere {
     fn default() -> Self {
-        Self { beams: vec![0; BANDS * CELLS], in_sweep: vec![0; BANDS * CELLS], observed: 0 }
+        let cells = BANDS * CELLS;
+        Self { beams: vec![0; cells], in_sweep: vec![0; cells], in_second: vec![false; cells], observed: 0 }
     }
 }
 
@@ -37,6 +40,7 @@ impl Sphere {
         self.observed += usize::from(self.beams[cell] == 0);
         self.beams[cell] += 1;
         self.in_sweep[cell] += 1;
+        self.in_second[cell] = true;
     }
 
     /// Observed fraction of the sphere.
@@ -51,6 +55,13 @@ impl Sphere {
         counts.sort_unstable();
         let median = counts.get(counts.len() / 2).copied().unwrap_or(0);
         (counts.len() as f64 / (BANDS * CELLS) as f64, f64::from(median) / CELL_SR)
+    }
+
+    /// Fraction of the sphere observed since the last call.
+    pub fn end_second(&mut self) -> f64 {
+        let observed = self.in_second.iter().filter(|observed| **observed).count();
+        self.in_second.fill(false);
+        observed as f64 / self.in_second.len() as f64
     }
 
     /// Beams per steradian and second in the observed cells.
@@ -114,6 +125,7 @@ mod tests {
         assert!(sphere.by_elevation(2.0).iter().all(|(_, d)| (d * 2.0 / even - 1.0).abs() < 0.02));
         assert_eq!(sphere.end_sweep().0, 1.0);
         assert_eq!(sphere.end_sweep(), (0.0, 0.0));
+        assert_eq!((sphere.end_second(), sphere.end_second()), (1.0, 0.0));
     }
 
     #[test]

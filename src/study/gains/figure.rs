@@ -1,30 +1,26 @@
 //! Figures of gain curves.
 
+use super::bode::dot_size;
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingPoint, SwingStudy};
 use crate::motion::Axis;
 use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series};
 
 /// Panels of the paper's figure 3: title, label, axes.
-const PANELS: [(&str, &str, &[Axis]); 3] = [
+pub(super) const PANELS: [(&str, &str, &[Axis]); 3] = [
     ("Angular rates; lines: closed form", "Gain, rotation", &[Axis::Roll, Axis::Pitch, Axis::Yaw]),
     ("Horizontal accelerations; lines: closed form", "Gain, x and y", &[Axis::X, Axis::Y]),
     ("Vertical acceleration; line: closed form", "Gain, z", &[Axis::Z]),
 ];
 
-/// Gains in three panels as in the paper: measurement as dots with 95 % bands, closed form as lines.
-pub fn gain_figure(curves: &[GainCurve]) -> Figure {
-    Figure::of(gain_panels(curves))
-}
-
-/// Charts of [`gain_figure`], rotations first.
+/// Gains in three charts with the linear axes of the paper, rotations first: measurement as dots with 95 % bands, closed form as
+/// lines.
 pub fn gain_panels(curves: &[GainCurve]) -> Vec<Chart> {
     let panels = PANELS.iter().map(|(title, label, axes)| {
         let shown = curves.iter().filter(|curve| axes.contains(&curve.axis));
         shown.fold(Chart::new(title, "Frequency (Hz)", label).starting_at_zero(), |chart, curve| {
             let (name, colour) = style(curve.axis);
-            // x and y of a round spring coincide: the curve drawn first has larger dots.
-            let size = if colour == Colour::Estimate { 4.5 } else { 2.5 };
+            let size = dot_size(colour);
             // The peak may be between two spectral lines.
             let peak = curve.peak_model.map(|peak| (peak.freq_hz, peak.gain));
             let mut model: Vec<_> = curve.points.iter().map(|p| (p.freq_hz, p.gain_model)).chain(peak).collect();
@@ -45,7 +41,7 @@ pub fn gain_panels(curves: &[GainCurve]) -> Vec<Chart> {
     panels.collect()
 }
 
-/// Coherence in the same panels as [`gain_figure`].
+/// Coherence in the same charts as [`gain_panels`].
 pub fn coherence_figure(curves: &[GainCurve]) -> Figure {
     Figure::of(coherence_panels(curves))
 }
@@ -65,25 +61,30 @@ pub fn coherence_panels(curves: &[GainCurve]) -> Vec<Chart> {
 
 /// Resonance frequency, peak gain and coherence over the swing amplitude.
 pub fn swing_figure(studies: &[SwingStudy]) -> Figure {
-    let chart = |label: &str, value: fn(&SwingPoint) -> Option<f64>| {
+    let chart = |label: &str, value: fn(&SwingPoint) -> Option<f64>, sigma: fn(&SwingPoint) -> Option<f64>| {
         let empty = Chart::new("", "Swing amplitude of the head, RMS (°)", label);
         studies.iter().fold(empty, |chart, study| {
             let (name, colour) = style(study.axis);
             let points: Vec<_> = study.points.iter().filter_map(|p| Some((p.swing_rms_deg, value(p)?))).collect();
             let mark = if study.axis.is_rotation() { Mark::Line(1.5) } else { Mark::Dashes(1.5) };
-            let dots = Series::dots("", colour, points.clone()).marked(Mark::Dots(4.0));
+            let ends = |p: &SwingPoint| {
+                let (value, half) = (value(p)?, SIGMAS_95 * sigma(p)?);
+                Some(BandPoint { x: p.swing_rms_deg, low: (value - half).max(0.0), high: value + half })
+            };
+            let band = study.points.iter().filter_map(ends).collect();
+            let dots = Series::dots("", colour, points.clone()).marked(Mark::Dots(4.0)).with_band(band);
             chart.with(Series::line(name, colour, points).marked(mark)).with(dots)
         })
     };
     Figure::of(vec![
-        chart("Resonance (Hz)", |p| p.peak.map(|peak| peak.freq_hz)),
-        chart("Peak gain", |p| p.peak.map(|peak| peak.gain)).starting_at_zero(),
-        chart("Coherence at the peak", |p| p.coherence),
+        chart("Resonance (Hz)", |p| p.peak.map(|peak| peak.freq_hz), |_| None),
+        chart("Peak gain, 95 % band", |p| p.peak.map(|peak| peak.gain), |p| p.peak_gain_sigma).starting_at_zero(),
+        chart("Coherence at the peak", |p| p.coherence, |_| None),
     ])
 }
 
 /// Name and colour of an axis's curve.
-fn style(axis: Axis) -> (&'static str, Colour) {
+pub(super) fn style(axis: Axis) -> (&'static str, Colour) {
     match axis {
         Axis::X => ("x", Colour::Estimate),
         Axis::Y => ("y", Colour::Second),

@@ -8,33 +8,46 @@ use crate::dynamics::{
 use crate::geometry::{Pose, Rotation, Vector};
 use crate::motion::Axis;
 use crate::signal::{Segments, TransferPoint, transfer_function};
-use crate::study::progress::PieceProgress;
+use crate::study::progress::{PieceProgress, check};
 use crate::study::{OnProgress, StudyError};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
+use std::sync::atomic::AtomicBool;
 
 /// Valid number of realisations: coherence requires at least two.
 const REALISATIONS: RangeInclusive<usize> = 2..=1000;
 /// Maximum number of stored steps per axis: 160 MB, and six axes are stored at once.
 const MAX_STORED_STEPS: usize = 10_000_000;
 
+/// Progress and stop of a gain measurement.
+#[derive(Clone, Copy)]
+pub struct GainWatch<'a> {
+    /// The caller sets this flag to stop the measurement.
+    pub stop: &'a AtomicBool,
+    /// Receives the finished fraction after each realisation.
+    pub on_progress: OnProgress<'a>,
+}
+
+impl GainWatch<'static> {
+    /// A measurement that is not stopped and reports nothing.
+    pub fn silent() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Self { stop: &NEVER, on_progress: &|_| () }
+    }
+}
+
 /// Measures the gains of `head` along and about all six axes, in the order of [`AXES`].
 ///
-/// Realisations run in parallel; the result does not depend on the number of threads. `on_progress` receives the finished
-/// fraction after each realisation.
+/// Realisations run in parallel; the result does not depend on the number of threads.
 ///
 /// # Errors
-/// If the plan is invalid, or if the simulation fails.
-pub fn gain_curves(
-    head: &HeadModel,
-    plan: &GainPlan,
-    on_progress: OnProgress<'_>,
-) -> Result<Vec<GainCurve>, StudyError> {
+/// If the plan is invalid, if the simulation fails, or if the measurement is stopped.
+pub fn gain_curves(head: &HeadModel, plan: &GainPlan, watch: GainWatch<'_>) -> Result<Vec<GainCurve>, StudyError> {
     let schedule = checked_schedule(head, plan)?;
     let tasks: Vec<_> = AXES.iter().flat_map(|axis| (0..plan.realisations).map(|k| (*axis, k))).collect();
-    let pieces = PieceProgress::new(tasks.len(), on_progress);
+    let pieces = PieceProgress::new(tasks.len(), watch.on_progress);
     let records = tasks.par_iter().map(|(axis, k)| {
-        let record = record(head, *axis, *k, plan, schedule);
+        let record = record(head, *axis, *k, plan, schedule, watch.stop);
         pieces.finish_one();
         record
     });
@@ -43,20 +56,20 @@ pub fn gain_curves(
     of_axes.map(|(axis, records)| curve(head, *axis, records, plan, schedule)).collect()
 }
 
-/// Measures the gain of `head` along or about `axis`; `on_progress` as in [`gain_curves`].
+/// Measures the gain of `head` along or about `axis`, as [`gain_curves`].
 ///
 /// # Errors
-/// If the plan is invalid, or if the simulation fails.
+/// As [`gain_curves`].
 pub fn gain_curve(
     head: &HeadModel,
     axis: Axis,
     plan: &GainPlan,
-    on_progress: OnProgress<'_>,
+    watch: GainWatch<'_>,
 ) -> Result<GainCurve, StudyError> {
     let schedule = checked_schedule(head, plan)?;
-    let pieces = PieceProgress::new(plan.realisations, on_progress);
+    let pieces = PieceProgress::new(plan.realisations, watch.on_progress);
     let records = (0..plan.realisations).into_par_iter().map(|k| {
-        let record = record(head, axis, k, plan, schedule);
+        let record = record(head, axis, k, plan, schedule, watch.stop);
         pieces.finish_one();
         record
     });
@@ -85,6 +98,9 @@ fn checked_schedule(head: &HeadModel, plan: &GainPlan) -> Result<Schedule, Study
     Ok(schedule)
 }
 
+/// Number of steps between two checks whether the measurement is to stop: below 10 ms.
+const STEPS_PER_CHECK: usize = 1000;
+
 /// Signals of base and head over one period in steady state.
 #[derive(Debug, Clone, Default)]
 struct Record {
@@ -94,7 +110,7 @@ struct Record {
     sum_squared_angle: f64,
     /// Maximum rotation angle, rad.
     max_angle: f64,
-    /// Contact of the coils of a spring, also while the head settles.
+    /// Contact of the coils of a spring, after the head has settled.
     coil_contact: Option<CoilContact>,
 }
 
@@ -105,6 +121,7 @@ fn record(
     index: usize,
     plan: &GainPlan,
     schedule: Schedule,
+    stop: &AtomicBool,
 ) -> Result<Record, StudyError> {
     let points = plan.points.unwrap_or_else(|| head.default_points());
     let base = ShakenBase::new(axis, index, plan, schedule, &points.base_in_base)?;
@@ -113,8 +130,11 @@ fn record(
     let mut watch = ContactWatch::new(head);
     for (step, state) in HeadSimulation::new(head, &base, plan.step_s)?.enumerate().take(schedule.steps()) {
         let state = state?;
-        watch.check(state.t_s, &state.base, &state.head);
+        if step.is_multiple_of(STEPS_PER_CHECK) {
+            check(stop)?;
+        }
         if step >= schedule.settling {
+            watch.check(state.t_s, &state.base, &state.head);
             probe.sample(&state, &mut record);
         }
     }

@@ -8,6 +8,7 @@
 //! coherence and widens the confidence band. Each curve includes the closed form of the linearised head
 //! ([`FrequencyResponse`](crate::dynamics::FrequencyResponse)).
 
+mod bode;
 mod curve;
 mod drive;
 mod figure;
@@ -16,9 +17,10 @@ mod page;
 mod swing;
 mod table;
 
+pub use bode::gain_figure;
 pub use curve::{AXES, GainCurve, GainPlan, GainPoint, axis_name};
-pub use figure::{coherence_figure, coherence_panels, gain_figure, gain_panels, swing_figure};
-pub use measure::{gain_curve, gain_curves};
+pub use figure::{coherence_figure, coherence_panels, gain_panels, swing_figure};
+pub use measure::{GainWatch, gain_curve, gain_curves};
 pub use page::page;
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, min_coherence, peak_table, swing_csv};

@@ -1,5 +1,6 @@
 //! The page of a gain measurement.
 
+use super::bode::LOWEST_SHARE;
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingStudy, axis_name, peak_table, swing_figure};
 use crate::dynamics::HeadModel;
@@ -10,8 +11,6 @@ use std::f64::consts::TAU;
 
 /// Maximum number of frequencies of a chart; more are thinned, and the largest gain of each interval is kept.
 const MAX_LINES: usize = 2_000;
-/// The lower edge of a band is at least this fraction of the gain: a logarithmic axis has no zero.
-const LOWEST_SHARE: f64 = 0.01;
 
 /// The page of a gain measurement as HTML; the same curves give the same bytes.
 ///

@@ -1,9 +1,9 @@
 //! Gains at large amplitudes, where the head is nonlinear: resonance and peak gain over swing amplitude.
 
-use super::{GainPlan, gain_curve};
+use super::{GainPlan, GainWatch, gain_curve};
 use crate::dynamics::{CoilContact, HeadModel, Peak};
 use crate::motion::Axis;
-use crate::study::{OnProgress, StudyError};
+use crate::study::StudyError;
 
 /// The resonance at one excitation amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -16,6 +16,8 @@ pub struct SwingPoint {
     pub swing_most_deg: f64,
     /// Peak of the gain curve; `None` for a monotonic curve.
     pub peak: Option<Peak>,
+    /// Standard error of the gain at the spectral line next to the peak.
+    pub peak_gain_sigma: Option<f64>,
     /// Coherence at the spectral line next to the peak; its difference from 1 is the nonlinear fraction of the power.
     pub coherence: Option<f64>,
     /// Contact of the coils of a spring; `None` if they did not touch.
@@ -44,7 +46,7 @@ fn by_name<S: serde::Serializer>(axis: &Axis, serializer: S) -> Result<S::Ok, S:
 /// Measures the gain about or along `axis` at several amplitudes.
 ///
 /// The excitation is such that the linearised head would swing by each of `swings_deg`, degrees RMS. Ends early, with a
-/// reason, if the simulation diverges. `on_progress` receives the finished fraction.
+/// reason, if the simulation diverges. `watch` receives the finished fraction.
 ///
 /// # Errors
 /// If the plan is invalid.
@@ -53,10 +55,12 @@ pub fn swing_study(
     axis: Axis,
     swings_deg: &[f64],
     plan: &GainPlan,
-    on_progress: OnProgress<'_>,
+    watch: GainWatch<'_>,
 ) -> Result<SwingStudy, StudyError> {
     let curves = (swings_deg.len() + 1) as f64;
-    let small = gain_curve(head, axis, plan, &|fraction| on_progress(fraction / curves))?;
+    let on_progress = watch.on_progress;
+    let small =
+        gain_curve(head, axis, plan, GainWatch { on_progress: &|fraction| on_progress(fraction / curves), ..watch })?;
     let mut study = SwingStudy { axis, peak_model: small.peak_model, points: Vec::new(), ended: None };
     for (before, swing_deg) in swings_deg.iter().enumerate() {
         let scale = swing_deg / small.swing_rms_deg;
@@ -65,19 +69,22 @@ pub fn swing_study(
             acceleration_m_per_s2: plan.acceleration_m_per_s2 * scale,
             ..plan.clone()
         };
-        match gain_curve(head, axis, &plan, &|fraction| on_progress((before as f64 + 1.0 + fraction) / curves)) {
+        let of_curve = |fraction| on_progress((before as f64 + 1.0 + fraction) / curves);
+        match gain_curve(head, axis, &plan, GainWatch { on_progress: &of_curve, ..watch }) {
             Ok(curve) => {
                 let next_to = |peak: Peak| {
                     let distance = |f: f64| (f - peak.freq_hz).abs();
                     curve.points.iter().min_by(|a, b| distance(a.freq_hz).total_cmp(&distance(b.freq_hz)))
                 };
+                let beside = curve.peak.and_then(next_to);
                 study.points.push(SwingPoint {
                     base_rms: if axis.is_rotation() { plan.rotation_deg_per_s } else { plan.acceleration_m_per_s2 },
                     swing_rms_deg: curve.swing_rms_deg,
                     swing_most_deg: curve.swing_most_deg,
                     peak: curve.peak,
                     coil_contact: curve.coil_contact,
-                    coherence: curve.peak.and_then(next_to).map(|p| p.coherence),
+                    peak_gain_sigma: beside.map(|p| p.gain_sigma),
+                    coherence: beside.map(|p| p.coherence),
                 });
             }
             Err(StudyError::Dynamics(error)) => {

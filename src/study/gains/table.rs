@@ -54,23 +54,25 @@ pub fn csv(curves: &[GainCurve]) -> String {
     text
 }
 
-/// CSV with one row per amplitude: `axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence`.
+/// CSV with one row per amplitude: `axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,peak_gain_sigma,coherence`.
 ///
-/// The last three are empty without a peak.
+/// The last four are empty without a peak.
 pub fn swing_csv(studies: &[SwingStudy]) -> String {
-    let mut text = "axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,coherence\n".to_owned();
+    let mut text =
+        "axis,base_rms,swing_rms_deg,swing_most_deg,peak_hz,peak_gain,peak_gain_sigma,coherence\n".to_owned();
     let or_empty = |x: Option<f64>| x.map_or(String::new(), |x| format!("{x:.5}"));
     for study in studies {
         for p in &study.points {
             let _ = writeln!(
                 text,
-                "{},{:.5},{:.4},{:.4},{},{},{}",
+                "{},{:.5},{:.4},{:.4},{},{},{},{}",
                 axis_name(study.axis),
                 p.base_rms,
                 p.swing_rms_deg,
                 p.swing_most_deg,
                 or_empty(p.peak.map(|peak| peak.freq_hz)),
                 or_empty(p.peak.map(|peak| peak.gain)),
+                or_empty(p.peak_gain_sigma),
                 or_empty(p.coherence),
             );
         }

@@ -10,6 +10,9 @@ const ENDURANCE_CYCLES: f64 = 1e6;
 /// 6-18, at its upper end of 1.4 GPa).
 const STRENGTH_AT_1000: f64 = 0.77;
 
+/// Default duration for which a spring must withstand its swing, hours.
+pub const MISSION_HOURS: f64 = 1000.0;
+
 /// A stress that alternates about a mean, von Mises.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StressCycle {

@@ -2,7 +2,7 @@
 
 use super::Shake;
 use super::margins::{LoadRecord, SpringMargins};
-use super::model::{SpringModel, at_rest};
+use super::model::SpringModel;
 use crate::dynamics::{AccelerationKind, CoilGaps, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState};
 use crate::elasticity::split;
 use crate::geometry::{Kinematics, Pose, Rotation, Vector};
@@ -24,9 +24,9 @@ pub struct DesignMetrics {
     pub rocking_hz: f64,
     /// Peak gain of the pitch rate.
     pub peak_gain: f64,
-    /// Static compression of the spring under the head, mm.
-    pub sag_mm: f64,
-    /// Mass of the active wire, g; `None` if spring or material are specified by stiffness only.
+    /// Static compression of a single spring under the head, mm; `None` for several springs or one given by its stiffness.
+    pub sag_mm: Option<f64>,
+    /// Mass of the active wire, of all springs together, g; `None` if spring or material are specified by stiffness only.
     pub spring_mass_g: Option<f64>,
     /// Field of view, degrees: twice the pitch amplitude, or in a simulation the 95 % elevation range of the forward
     /// beam.
@@ -35,6 +35,8 @@ pub struct DesignMetrics {
     pub rate_deg_per_s: f64,
     /// Maximum stress in the wire divided by the yield stress; `None` if either is not known.
     pub stress_share: Option<f64>,
+    /// Margin of the wire's stress cycle by Goodman's line over the mission; `None` if the strength of the wire is unknown.
+    pub fatigue_margin: Option<f64>,
     /// Margins of the spring.
     pub margins: SpringMargins,
 }
@@ -45,11 +47,12 @@ impl DesignMetrics {
         match measure {
             Measure::RockingHz => Some(self.rocking_hz),
             Measure::PeakGain => Some(self.peak_gain),
-            Measure::SagMm => Some(self.sag_mm),
+            Measure::SagMm => self.sag_mm,
             Measure::SpringMassG => self.spring_mass_g,
             Measure::FieldOfViewDeg => Some(self.field_of_view_deg),
             Measure::RateDegPerS => Some(self.rate_deg_per_s),
             Measure::StressShare => self.stress_share,
+            Measure::FatigueMargin => self.fatigue_margin,
             _ => None,
         }
     }
@@ -65,11 +68,17 @@ const MAX_PEAK_HZ: f64 = 20.0;
 
 /// Computes the metrics of the linearised head: static pose, stiffness, modes and gains.
 ///
-/// The response is linear for any amplitude. The computation takes less than 1 ms.
+/// The response is linear for any amplitude. The computation takes less than 1 ms. In the mission, the head swings for
+/// `mission_hours`.
 ///
 /// # Errors
 /// When the spec is invalid or the head has no stable rest pose. A head above the maximum mass of its spring is no error.
-pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<DesignMetrics, StudyError> {
+pub fn closed_form(
+    spec: &HeadSpec,
+    source: &Source,
+    shake: &Shake,
+    mission_hours: f64,
+) -> Result<DesignMetrics, StudyError> {
     let head = HeadModel::new_without_advice(spec, source)?;
     let model = SpringModel::of(spec, head.body())?;
     let frequency_hz = shake.frequency_of(&head);
@@ -79,17 +88,18 @@ pub fn closed_form(spec: &HeadSpec, source: &Source, shake: &Shake) -> Result<De
     let swing = LinearSwing { head: &head, response: &response, foot, omega: TAU * frequency_hz, shake };
     let pitch = swing.amplitude()[4].norm();
     let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
-    let mut loads = LoadRecord::new(&model, &at_rest(&head));
-    phases.for_each(|phase| loads.add(&swing.state(phase), None));
+    let mut loads = LoadRecord::of_linear_swing(&model, &head);
+    phases.for_each(|phase| loads.add(&swing.state(phase), &[]));
     let swing = SwingResult {
         field_of_view_deg: 2.0 * pitch.to_degrees(),
         rate_deg_per_s: (swing.omega * pitch).to_degrees(),
+        cycles: mission_cycles(mission_hours, frequency_hz),
         loads: &loads,
     };
     Ok(metrics(&model, &head, &swing))
 }
 
-/// Computes the metrics by a full simulation of the shake, with the coverage of `lidar`.
+/// Computes the metrics by a full simulation of the shake, with the coverage of `lidar`; the mission as in [`closed_form`].
 ///
 /// # Errors
 /// When the spec is invalid, the head has no stable rest pose, or the simulation fails.
@@ -99,6 +109,7 @@ pub fn simulated(
     shake: &Shake,
     lidar: &Lidar,
     plan: &CoveragePlan,
+    mission_hours: f64,
 ) -> Result<(DesignMetrics, Coverage), StudyError> {
     let head = HeadModel::new(spec, source)?;
     let model = SpringModel::of(spec, head.body())?;
@@ -111,19 +122,20 @@ pub fn simulated(
     let shake = shaker.build(&Source::in_memory("the shake of the base", ""), None, duration_s, Seed(1))?;
     let base_from_shaken = Pose::from_parts(head.default_points().base_in_base.into(), Rotation::identity());
     let motion = ShakeAboutFoot { shake: shake.as_ref(), shaken_from_base: base_from_shaken.inverse() };
-    let (mut loads, mut step) = (LoadRecord::new(&model, &at_rest(&head)), 0_usize);
+    let (mut loads, mut step) = (LoadRecord::of_simulation(&model, &head), 0_usize);
     let mut gaps = CoilGaps::of(&head);
     let coverage = coverage(&head, &motion, lidar, plan, |state| {
         step += 1;
         // A period has hundreds of steps, so every tenth is sufficient for the maximum.
         if step.is_multiple_of(10) {
             let base_from_head = state.base.world_from_body.inv_mul(&state.head.world_from_body);
-            loads.add(state, gaps.smallest(&base_from_head).map(|gap| gap.gap_m));
+            loads.add(state, &gaps.of_each(&base_from_head));
         }
     })?;
     let swing = SwingResult {
         field_of_view_deg: coverage.field_of_view_deg,
         rate_deg_per_s: coverage.gyro.most_deg_per_s,
+        cycles: mission_cycles(mission_hours, frequency_hz),
         loads: &loads,
     };
     Ok((metrics(&model, &head, &swing), coverage))
@@ -145,7 +157,13 @@ impl BaseMotion for ShakeAboutFoot<'_> {
 struct SwingResult<'a> {
     field_of_view_deg: f64,
     rate_deg_per_s: f64,
+    /// Number of cycles in the mission.
+    cycles: f64,
     loads: &'a LoadRecord<'a>,
+}
+
+fn mission_cycles(hours: f64, frequency_hz: f64) -> f64 {
+    hours * 3600.0 * frequency_hz
 }
 
 /// The metrics of the head with the response `swing`.
@@ -156,11 +174,12 @@ fn metrics(model: &SpringModel, head: &HeadModel, swing: &SwingResult<'_>) -> De
     DesignMetrics {
         rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
         peak_gain: peak.map_or(1.0, |peak| peak.gain),
-        sag_mm: model.sag_m(head) * 1e3,
+        sag_mm: model.sag_m(head).map(|sag_m| sag_m * 1e3),
         spring_mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
         field_of_view_deg: swing.field_of_view_deg,
         rate_deg_per_s: swing.rate_deg_per_s,
         stress_share: margins.yielding.map(|margin| 1.0 / margin),
+        fatigue_margin: swing.loads.fatigue_margin(swing.cycles),
         margins,
     }
 }

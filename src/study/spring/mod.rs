@@ -19,7 +19,7 @@ mod view_plane;
 mod wire;
 
 pub use export::{ExportError, HeadExport};
-pub use fatigue::StressCycle;
+pub use fatigue::{MISSION_HOURS, StressCycle};
 pub use margins::SpringMargins;
 pub use metrics::{DesignMetrics, closed_form, simulated};
 pub use mode_figure::mode_figure;

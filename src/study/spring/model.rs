@@ -1,13 +1,33 @@
 //! The spring of a head: coil, wire and mounting.
 
 use super::wire::{SpringMounting, Wire};
-use crate::dynamics::{Body, DynamicsError, HeadModel, HeadSpec, HeadState, LinkageSpec};
-use crate::elasticity::{Coil, SpringDesign};
+use crate::dynamics::{Body, DynamicsError, ElementSpec, HeadModel, HeadSpec, HeadState, LinkageSpec};
+use crate::elasticity::{Coil, SpringDesign, SpringSpec};
 use crate::geometry::{Kinematics, Pose};
 use crate::study::StudyError;
 
-/// Properties of the spring of a head.
+/// A coil of a head with its wire; each is `None` for a spring given by its stiffness.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WoundSpring {
+    pub wire: Option<Wire>,
+    /// The active coils.
+    pub coil: Option<Coil>,
+}
+
+impl WoundSpring {
+    fn of(spring: &SpringSpec) -> Result<Self, StudyError> {
+        let coil = match spring.design().map_err(DynamicsError::from)? {
+            SpringDesign::Coil(coil) => Some(coil),
+            SpringDesign::Stiffness { .. } => None,
+        };
+        Ok(Self { wire: Wire::of(spring)?, coil })
+    }
+}
+
+/// Properties of the spring of a head, or of the springs of a suspension.
 pub(super) struct SpringModel {
+    /// The springs of a suspension, in the order of the spec.
+    pub suspension: Vec<WoundSpring>,
     pub wire: Option<Wire>,
     pub mounting: Option<SpringMounting>,
     /// Whether the spring carries the head without a cable; the stress then follows from the motion of the head.
@@ -16,21 +36,22 @@ pub(super) struct SpringModel {
     pub coil: Option<Coil>,
     /// Length of each rigid end, m.
     pub end_m: f64,
+    /// Mass of the wire, or of the wires of a suspension.
     pub mass_kg: Option<f64>,
 }
 
 impl SpringModel {
     pub fn of(spec: &HeadSpec, body: &Body) -> Result<Self, StudyError> {
         let mounting = SpringMounting::of(spec, body);
-        let LinkageSpec::Spring { spring, cable, .. } = &spec.linkage else {
-            return Ok(Self { mounting, ..Self::without_mounting() });
+        let (spring, cable) = match &spec.linkage {
+            LinkageSpec::Spring { spring, cable, .. } => (spring, cable),
+            LinkageSpec::Suspension { elements, .. } => return Self::of_suspension(elements),
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => return Ok(Self::without_mounting()),
         };
-        let coil = match spring.design().map_err(DynamicsError::from)? {
-            SpringDesign::Coil(coil) => Some(coil),
-            SpringDesign::Stiffness { .. } => None,
-        };
+        let WoundSpring { wire, coil } = WoundSpring::of(spring)?;
         Ok(Self {
-            wire: Wire::of(spring)?,
+            suspension: Vec::new(),
+            wire,
             mounting,
             has_no_cable: cable.is_none(),
             coil,
@@ -39,9 +60,32 @@ impl SpringModel {
         })
     }
 
+    fn of_suspension(elements: &[ElementSpec]) -> Result<Self, StudyError> {
+        let springs = elements.iter().filter_map(|element| match element {
+            ElementSpec::Spring(mounted) => Some(&mounted.spring),
+            ElementSpec::Cord(_) | ElementSpec::Float(_) | ElementSpec::UniversalJoint(_) => None,
+        });
+        let springs: Vec<&SpringSpec> = springs.collect();
+        let masses = springs.iter().map(|spring| spring.wire_mass_kg().map_err(DynamicsError::from));
+        let masses: Option<Vec<f64>> = masses.collect::<Result<_, _>>()?;
+        Ok(Self {
+            suspension: springs.into_iter().map(WoundSpring::of).collect::<Result<_, _>>()?,
+            mass_kg: masses.filter(|masses| !masses.is_empty()).map(|masses| masses.iter().sum()),
+            ..Self::without_mounting()
+        })
+    }
+
     /// A model without wire and mounting, for a head without a rest pose or a spring.
     pub fn without_mounting() -> Self {
-        Self { wire: None, mounting: None, has_no_cable: false, coil: None, end_m: 0.0, mass_kg: None }
+        Self {
+            suspension: Vec::new(),
+            wire: None,
+            mounting: None,
+            has_no_cable: false,
+            coil: None,
+            end_m: 0.0,
+            mass_kg: None,
+        }
     }
 
     /// Whether the load on the spring follows from the motion of the head.
@@ -55,10 +99,11 @@ impl SpringModel {
         Some(mounting.stress_pa(&wire, state))
     }
 
-    /// Compression at rest: free length minus distance from foot to top, m; 0 if the free length is not known.
-    pub fn sag_m(&self, head: &HeadModel) -> f64 {
-        let (Some(mounting), Some(coil)) = (&self.mounting, &self.coil) else { return 0.0 };
-        coil.free_length_m() - mounting.length_m(head.base_from_head_at_rest())
+    /// Compression of a single spring at rest: free length minus distance from foot to top, m; `None` if the free length is not
+    /// known.
+    pub fn sag_m(&self, head: &HeadModel) -> Option<f64> {
+        let (mounting, coil) = self.mounting.zip(self.coil)?;
+        Some(coil.free_length_m() - mounting.length_m(head.base_from_head_at_rest()))
     }
 }
 

@@ -2,11 +2,11 @@
 
 use super::capacity::heaviest_head;
 use super::model::{SpringModel, at_rest};
-use super::{DesignMetrics, Shake, closed_form, mode_name, simulated};
+use super::{DesignMetrics, MISSION_HOURS, Shake, closed_form, mode_name, simulated};
 use crate::dynamics::{
     AccelerationKind, ElementLoad, HeadModel, HeadSpec, LinkageSpec, MassLimit, Mode, ModeKind, Peak, stands_with_mass,
 };
-use crate::elasticity::{Coil, Matrix6, Spring, SpringDesign, buckling_load_n};
+use crate::elasticity::{Coil, EndsSpec, Material, Matrix6, Spring, SpringDesign, SpringSpec, buckling_load_n};
 use crate::geometry::{STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
 use crate::sensors::Lidar;
 use crate::spec::Source;
@@ -53,6 +53,20 @@ pub struct SpringReport {
 pub struct CoilReport {
     /// Free length, mm.
     pub free_length_mm: f64,
+    /// Mean diameter of the coil, mm.
+    pub coil_diameter_mm: f64,
+    /// Diameter of the wire, mm.
+    pub wire_diameter_mm: f64,
+    /// Number of active coils.
+    pub active_coils: f64,
+    /// Number of coils, those of the ends included.
+    pub total_coils: f64,
+    /// Length at which all coils touch, ends included, mm.
+    pub solid_length_mm: f64,
+    /// Ends.
+    pub ends: EndsSpec,
+    /// Material of the wire.
+    pub material: Material,
     /// Spring index: mean coil diameter divided by wire diameter.
     pub index: f64,
     /// Mass of the active wire, g; `None` for a material specified by its moduli only.
@@ -163,7 +177,7 @@ pub fn spring_report(
         heaviest_head_limit: heaviest.map(|limit| limit.reason),
         bearings,
         coil,
-        rest: Some(rest_report(&head, model.coil.map(|_| model.sag_m(&head)))),
+        rest: Some(rest_report(&head, model.sag_m(&head))),
         stiffness: head.linear().map(|linear| rows(&linear.stiffness)),
         modes: head.linear_modes().iter().map(mode_report).collect(),
         gain_peaks: AXES.map(peak).to_vec(),
@@ -216,8 +230,8 @@ fn shake_response(
     lidar: &Lidar,
     plan: &CoveragePlan,
 ) -> Result<ShakeResponse, StudyError> {
-    let closed_form = closed_form(spec, source, shake)?;
-    let (simulated, coverage, failed) = match simulated(spec, source, shake, lidar, plan) {
+    let closed_form = closed_form(spec, source, shake, MISSION_HOURS)?;
+    let (simulated, coverage, failed) = match simulated(spec, source, shake, lidar, plan, MISSION_HOURS) {
         Ok((metrics, coverage)) => (Some(metrics), Some(coverage), None),
         Err(error @ StudyError::Dynamics(_)) => (None, None, Some(error.to_string())),
         Err(error) => return Err(error),
@@ -225,16 +239,28 @@ fn shake_response(
     Ok(ShakeResponse { shake: *shake, closed_form, simulated, coverage, failed })
 }
 
-fn coil_of(spec: &HeadSpec) -> Result<Option<Coil>, StudyError> {
+/// The coil of a head on a single spring, with its ends and material.
+struct OrderedCoil {
+    coil: Coil,
+    ends: EndsSpec,
+    material: Material,
+}
+
+fn coil_of(spec: &HeadSpec) -> Result<Option<OrderedCoil>, StudyError> {
     let LinkageSpec::Spring { spring, .. } = &spec.linkage else { return Ok(None) };
-    Ok(match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
-        SpringDesign::Coil(coil) => Some(coil),
-        SpringDesign::Stiffness { .. } => None,
+    let resolved = spring.resolved()?;
+    let design = resolved.design().map_err(crate::dynamics::DynamicsError::from)?;
+    Ok(match (design, resolved) {
+        (SpringDesign::Coil(coil), SpringSpec::Coil { ends, material, .. }) => {
+            Some(OrderedCoil { coil, ends, material })
+        }
+        _ => None,
     })
 }
 
 /// The report on a coil under the compressive load `load_n`.
-fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<f64>) -> CoilReport {
+fn coil_report(ordered: &OrderedCoil, model: &SpringModel, load_n: f64, stress_pa: Option<f64>) -> CoilReport {
+    let OrderedCoil { coil, ends, material } = ordered;
     let length_m = coil.free_length_m() - load_n / coil.axial_n_per_m();
     let open_m = length_m - coil.solid_length_m();
     let (radius_m, wire_m) = model.wire.map_or((f64::NAN, f64::NAN), |w| (w.coil_radius_m, w.diameter_m));
@@ -243,6 +269,13 @@ fn coil_report(coil: &Coil, model: &SpringModel, load_n: f64, stress_pa: Option<
     let at_top = Spring::of_coil(coil, load_n, GUIDED_SEGMENTS).and_then(|spring| spring.guided(load_n)).ok();
     CoilReport {
         free_length_mm: (coil.free_length_m() + 2.0 * model.end_m) * 1e3,
+        coil_diameter_mm: coil.coil_diameter_m() * 1e3,
+        wire_diameter_mm: coil.wire_diameter_m() * 1e3,
+        active_coils: coil.active_coils(),
+        total_coils: coil.active_coils() + ends.inactive_coils(),
+        solid_length_mm: (coil.solid_length_m() + 2.0 * model.end_m) * 1e3,
+        ends: *ends,
+        material: *material,
         load_n,
         index: 2.0 * radius_m / wire_m,
         mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
@@ -314,6 +347,12 @@ mod tests {
         // 0.35 kg and half of the wire's 52 g at 4282 N/m compress the spring by 0.86 mm; 12 equal gaps add up to 120 - 36 - 0.86 mm.
         assert!((report.rest.unwrap().sag_mm.unwrap() - 0.86).abs() < 0.02);
         assert!((coil.gap_mm - 83.14 / 12.0).abs() < 0.01, "{}", coil.gap_mm);
+        // 25 mm x 3 mm, 12 coils, 120 mm: 36 mm when all coils touch.
+        let lengths = [coil.solid_length_mm, coil.free_length_mm, coil.active_coils, coil.total_coils];
+        assert!(
+            lengths.iter().zip([36.0, 120.0, 12.0, 12.0]).all(|(x, known)| (x - known).abs() < 1e-9),
+            "{lengths:?}"
+        );
         assert!(coil.stress_at_rest_mpa.unwrap() < 0.3 * coil.yield_mpa.unwrap());
         let shaken = report.shaken.unwrap();
         let (linear, full) = (shaken.closed_form, shaken.simulated.unwrap());
@@ -329,8 +368,8 @@ mod tests {
         let (spec, source) = load("handheld").unwrap();
         let shake = Shake { pitch_deg: 0.1, frequency_hz: None };
         let plan = CoveragePlan { from_s: 15.0, duration_s: 3.0, ..CoveragePlan::default() };
-        let linear = closed_form(&spec, &source, &shake).unwrap();
-        let (full, _) = simulated(&spec, &source, &shake, &utm30lx(), &plan).unwrap();
+        let linear = closed_form(&spec, &source, &shake, MISSION_HOURS).unwrap();
+        let (full, _) = simulated(&spec, &source, &shake, &utm30lx(), &plan, MISSION_HOURS).unwrap();
         assert!((full.field_of_view_deg / linear.field_of_view_deg - 0.997).abs() < 0.01, "{linear:?} {full:?}");
         assert!((full.rate_deg_per_s / linear.rate_deg_per_s - 1.0).abs() < 0.02, "{linear:?} {full:?}");
         assert!((full.stress_share.unwrap() / linear.stress_share.unwrap() - 1.0).abs() < 0.03, "{linear:?} {full:?}");

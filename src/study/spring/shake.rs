@@ -17,6 +17,19 @@ pub struct Shake {
 }
 
 impl Shake {
+    /// Checks the frequency, which a spec can leave out.
+    ///
+    /// # Errors
+    /// A message if it is not a finite number above 0.
+    pub fn check(&self) -> Result<(), String> {
+        match self.frequency_hz {
+            Some(hz) if !(hz.is_finite() && hz > 0.0) => {
+                Err(format!("frequency_hz: expected a finite number above 0, found {hz}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Amplitude of the base's pitch, rad.
     pub(super) fn base_rad(&self) -> f64 {
         self.pitch_deg.to_radians()

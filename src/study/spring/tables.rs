@@ -3,13 +3,11 @@
 use super::mode_figure::ratio;
 use super::{CoilReport, ModeReport, RestReport, SpringReport};
 use crate::dynamics::{ElementKind, ElementLoad};
+use crate::elasticity::VALID_BUCKLING_MARGIN;
 use crate::report::page::PageTable;
 
 /// Names of the six directions of a stiffness matrix or a mode shape.
 const DIRECTIONS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
-
-/// Buckling load over the load, down to which the force law was compared with an exact rod.
-const VALID_BUCKLING_MARGIN: f64 = 1.25;
 
 /// A value of a report with its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -108,15 +106,26 @@ fn coil(coil: &CoilReport) -> Vec<Property> {
         (Some(stress), Some(yields)) => format!("{stress:.0} MPa (yield {yields:.0} MPa)"),
         (stress, _) => or_dash(stress, "MPa"),
     };
+    let diameters = format!("{:.2} mm, of wire of {:.2} mm", coil.coil_diameter_mm, coil.wire_diameter_mm);
+    let ends = coil.ends.name();
+    let coils = format!("{:.2} active, {:.2} in total ({ends})", coil.active_coils, coil.total_coils);
+    let [gap, clash_bend] = if coil.gap_mm > 0.0 {
+        [format!("{:.2} mm", coil.gap_mm), format!("{:.0} deg", coil.clash_bend_deg)]
+    } else {
+        ["none: the coils touch", "-"].map(str::to_owned)
+    };
     vec![
-        row("free length", format!("{:.2} mm", coil.free_length_mm)),
+        row("mean diameter", diameters),
+        row("coils", coils),
+        row("material", coil.material.name().to_owned()),
+        row("free length, solid length", format!("{:.2} mm, {:.2} mm", coil.free_length_mm, coil.solid_length_mm)),
         row("spring index", format!("{:.2}", coil.index)),
-        row("wire mass", or_dash(coil.mass_g, "g")),
+        row("mass of the active wire", or_dash(coil.mass_g, "g")),
         row("axial stiffness", format!("{:.1} N/m", coil.axial_n_per_m)),
         row("torsional stiffness", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
         row("buckling load", buckles),
         row("stress at rest", stress),
-        row("gap between coils", format!("{:.2} mm", coil.gap_mm)),
-        row("bending angle at coil contact", format!("{:.0} deg", coil.clash_bend_deg)),
+        row("gap between coils", gap),
+        row("bending angle at coil contact", clash_bend),
     ]
 }

@@ -25,6 +25,8 @@ pub(super) struct RunInputs<'a> {
     pub closes_loops: bool,
     /// Information bound with an unknown map, m.
     pub slam_bound_m: Option<f64>,
+    /// Whether the cloud is compared with the true surfaces.
+    pub compares_clouds: bool,
     /// Map of the reference system.
     pub reference: Option<&'a ReferenceMap>,
 }
@@ -85,10 +87,8 @@ pub(super) fn estimate(recording: File, inputs: &RunInputs, stop: &AtomicBool) -
         let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
         let recording = RunRecording::open(recording, inputs.journey.ignore_manifest)?;
         let estimates = recording.estimate(inputs.journey, inputs.closes_loops, &mut watch)?;
-        let cloud = inputs
-            .reference
-            .map(|reference| reference.compare(&recording, &estimates, inputs.simulation, &watch))
-            .transpose()?;
+        let compare = || CloudComparison::new(&recording, &estimates, inputs.simulation, inputs.reference, &watch);
+        let cloud = inputs.compares_clouds.then(compare).transpose()?;
         Ok(EstimateMetrics { cloud, ..metrics(&estimates, inputs, &mut watch) })
     })
 }

@@ -6,8 +6,8 @@ use super::{BaseSpec, Measure, Plan};
 use crate::dynamics::HeadModel;
 use crate::spec;
 use crate::study::StudyError;
-use crate::study::gains::gain_curve;
-use crate::study::spring::closed_form;
+use crate::study::gains::{GainWatch, gain_curve};
+use crate::study::spring::{MISSION_HOURS, closed_form};
 use std::time::Instant;
 
 /// Evaluates run `index`. A failure, such as a head without static equilibrium, is recorded as an error.
@@ -24,7 +24,7 @@ pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutc
 fn metrics(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, StudyError> {
     let inputs = plan.inputs(index)?.closed_form();
     let ClosedForm { shake, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
-    let of = closed_form(&head.spec, &head.source(), &shake)?;
+    let of = closed_form(&head.spec, &head.source(), &shake, MISSION_HOURS)?;
     Ok(RunOutcome { figures: measures.iter().map(|measure| of.figure(*measure)).collect(), ..RunOutcome::default() })
 }
 
@@ -33,7 +33,7 @@ fn gains(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, St
     let inputs = plan.inputs(index)?.gain_run();
     let GainRun { gains, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
     let head = HeadModel::new(&head.spec, &head.source())?;
-    let curve = gain_curve(&head, gains.axis, &gains.plan(), &|_| ())?;
+    let curve = gain_curve(&head, gains.axis, &gains.plan(), GainWatch::silent())?;
     let figure = |measure: &Measure| curve.peak.filter(|_| *measure == Measure::PeakGain).map(|peak| peak.gain);
     let figures = measures.iter().map(figure).collect();
     Ok(RunOutcome { figures, details: Some(spec::to_text(&curve)?), ..RunOutcome::default() })

@@ -50,13 +50,11 @@ pub enum Measure {
     WayM,
     /// Open loop aligned over the first 20 s: position error at the end over the length of the path.
     DriftOverPath,
-    /// Standard deviation of the map's points about the true surfaces, with timing errors or a reference system, m.
+    /// Standard deviation of the map's points about the true surfaces, along their normals, m.
     CloudSigmaM,
-    /// Mean signed distance of the map's points to the true surfaces, with timing errors or a reference system, m:
-    /// positive where they are too near to the sensor.
+    /// Mean signed distance of the map's points to the true surfaces, m: positive where they are too near to the sensor.
     CloudBiasM,
-    /// Ratio of that standard deviation to that of the same beams projected by the true trajectory; with a reference
-    /// system.
+    /// Ratio of that standard deviation to that of the same beams projected by the true trajectory; without timing errors.
     CloudOverTruth,
     /// Standard deviation of the map's points about the surfaces of the reference system's map, along their normals, m
     /// (Bosse, Zlot and Flick 2012, section IV-A). Both maps are aligned with the truth. It is missing if the reference
@@ -70,7 +68,10 @@ pub enum Measure {
     ClockErrorS,
     /// Fraction of the sphere of directions that the lidar observed.
     FractionSeen,
-    /// Time until 90 % of that fraction was observed, s.
+    /// Fraction of the sphere observed in one second, mean over the seconds.
+    #[serde(rename = "fraction_seen_1s")]
+    FractionSeen1S,
+    /// Time until 90 % of `fraction_seen` was observed, s.
     CoveredS,
     /// Beams per steradian and second, mean over the observed part of the sphere.
     DensityPerSrS,
@@ -83,6 +84,8 @@ pub enum Measure {
     RateP99DegPerS,
     /// Fraction of the time in which at least one axis of the gyroscope is saturated.
     Saturated,
+    /// Fraction of the gyroscope's range above the maximum angular rate on an axis; negative if the rate exceeds the range.
+    GyroRangeLeft,
     /// Time in which coils of the spring touch, s. A design should have none: the motion after a clash is approximate.
     CoilContactS,
     /// Frequency of the slowest mode, Hz.
@@ -95,6 +98,9 @@ pub enum Measure {
     SpringMassG,
     /// Maximum stress in the wire over the yield strength.
     StressShare,
+    /// Margin of the wire's stress cycle by Goodman's line: over the mission of a spring search, else over 1000 hours of the
+    /// shake. Above 1 the spring lasts as long.
+    FatigueMargin,
     /// Computing time of the open loop on one thread over the length of the recording. Like the next two it is reported in
     /// `times.parquet`, not in the table of results.
     OpenLoopTimeRatio,
@@ -111,8 +117,10 @@ pub(super) enum Origin {
     Estimate,
     /// Estimation from a recording, only with timing errors.
     Map,
-    /// Estimation from a recording, with timing errors or with a reference system.
+    /// Estimation from a recording, with or without timing errors.
     AnyMap,
+    /// Estimation from a recording, the map of which is compared with the true surfaces; only without timing errors.
+    Cloud,
     /// Estimation from two recordings, of a run and of its reference system.
     Reference,
     /// Simulation of the head's swing without ray casting.
@@ -130,13 +138,16 @@ pub(super) enum Origin {
 impl Origin {
     /// Whether the measure needs a recording and an estimate.
     pub(super) fn is_estimate(self) -> bool {
-        matches!(self, Self::Estimate | Self::Map | Self::AnyMap | Self::Reference | Self::EstimateWallClock)
+        matches!(
+            self,
+            Self::Estimate | Self::Map | Self::AnyMap | Self::Cloud | Self::Reference | Self::EstimateWallClock
+        )
     }
 }
 
 impl Measure {
     /// Every measure.
-    pub const ALL: [Self; 41] = [
+    pub const ALL: [Self; 44] = [
         Self::PositionRmseM,
         Self::RotationRmseDeg,
         Self::DriftMPerMin,
@@ -163,18 +174,21 @@ impl Measure {
         Self::ReferenceRmseM,
         Self::ClockErrorS,
         Self::FractionSeen,
+        Self::FractionSeen1S,
         Self::CoveredS,
         Self::DensityPerSrS,
         Self::FieldOfViewDeg,
         Self::RateDegPerS,
         Self::RateP99DegPerS,
         Self::Saturated,
+        Self::GyroRangeLeft,
         Self::CoilContactS,
         Self::RockingHz,
         Self::PeakGain,
         Self::SagMm,
         Self::SpringMassG,
         Self::StressShare,
+        Self::FatigueMargin,
         Self::OpenLoopTimeRatio,
         Self::ClosedLoopTimeRatio,
         Self::WallS,
@@ -225,18 +239,23 @@ impl Measure {
             }
             Self::ClockErrorS => ("clock_error_s", "clock error", "Clock offset error at the end (ms)", "ms", 1e3),
             Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
+            Self::FractionSeen1S => {
+                ("fraction_seen_1s", "in 1 s", "Observed fraction of the sphere in a second (%)", "%", 1e2)
+            }
             Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
             Self::DensityPerSrS => ("density_per_sr_s", "density", "Beam density (1/sr/s)", "1/sr/s", 1.0),
             Self::FieldOfViewDeg => ("field_of_view_deg", "view", "Field of view (°)", "deg", 1.0),
             Self::RateDegPerS => ("rate_deg_per_s", "rate", "Maximum rate (°/s)", "deg/s", 1.0),
             Self::RateP99DegPerS => ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (°/s)", "deg/s", 1.0),
             Self::Saturated => ("saturated", "saturated", "Time with a saturated gyroscope (%)", "%", 1e2),
+            Self::GyroRangeLeft => ("gyro_range_left", "range left", "Range of the gyroscope left (%)", "%", 1e2),
             Self::CoilContactS => ("coil_contact_s", "contact", "Time with touching coils (s)", "s", 1.0),
             Self::RockingHz => ("rocking_hz", "rocking", "Rocking frequency (Hz)", "Hz", 1.0),
             Self::PeakGain => ("peak_gain", "gain", "Peak gain", "1", 1.0),
             Self::SagMm => ("sag_mm", "sag", "Static compression (mm)", "mm", 1.0),
             Self::SpringMassG => ("spring_mass_g", "mass", "Mass of the spring (g)", "g", 1.0),
             Self::StressShare => ("stress_share", "stress", "Stress over yield strength (%)", "%", 1e2),
+            Self::FatigueMargin => ("fatigue_margin", "fatigue", "Margin of fatigue", "1", 1.0),
             Self::OpenLoopTimeRatio => ("open_loop_time_ratio", "loop time", "Open loop time (%)", "%", 1e2),
             Self::ClosedLoopTimeRatio => ("closed_loop_time_ratio", "closure time", "Closure time (%)", "%", 1e2),
             Self::WallS => ("wall_s", "time", "Computing time (s)", "s", 1.0),
@@ -249,7 +268,7 @@ impl Measure {
     }
 
     /// Short name for tables.
-    pub(super) fn short(self) -> &'static str {
+    pub fn short(self) -> &'static str {
         self.names().1
     }
 
@@ -264,7 +283,7 @@ impl Measure {
     }
 
     /// Display unit, and the factor from the unit in files to it.
-    pub(in crate::study) fn unit(self) -> (&'static str, f64) {
+    pub fn unit(self) -> (&'static str, f64) {
         (self.names().3, self.names().4)
     }
 
@@ -295,19 +314,23 @@ impl Measure {
             | Self::DriftOverPath => Origin::Estimate,
             Self::ClockErrorS => Origin::Map,
             Self::CloudSigmaM | Self::CloudBiasM => Origin::AnyMap,
-            Self::CloudOverTruth | Self::ReferenceSigmaM | Self::ReferenceBiasM | Self::ReferenceRmseM => {
-                Origin::Reference
-            }
+            Self::CloudOverTruth => Origin::Cloud,
+            Self::ReferenceSigmaM | Self::ReferenceBiasM | Self::ReferenceRmseM => Origin::Reference,
             Self::FractionSeen
+            | Self::FractionSeen1S
             | Self::CoveredS
             | Self::DensityPerSrS
             | Self::RateP99DegPerS
             | Self::Saturated
+            | Self::GyroRangeLeft
             | Self::CoilContactS => Origin::Swing,
             Self::FieldOfViewDeg | Self::RateDegPerS => Origin::SwingOrClosedForm,
-            Self::RockingHz | Self::PeakGain | Self::SagMm | Self::SpringMassG | Self::StressShare => {
-                Origin::ClosedForm
-            }
+            Self::RockingHz
+            | Self::PeakGain
+            | Self::SagMm
+            | Self::SpringMassG
+            | Self::StressShare
+            | Self::FatigueMargin => Origin::ClosedForm,
             Self::OpenLoopTimeRatio | Self::ClosedLoopTimeRatio => Origin::EstimateWallClock,
             Self::WallS => Origin::WallClock,
         }
@@ -333,6 +356,16 @@ impl Measure {
         matches!(self.origin(), Origin::ClosedForm | Origin::SwingOrClosedForm)
     }
 
+    /// Whether it is a figure of a journey alone: it has no closed form, and needs no second system or timing errors.
+    pub(in crate::study) fn needs_journey(self) -> bool {
+        matches!(self.origin(), Origin::Estimate | Origin::AnyMap | Origin::Cloud | Origin::Swing)
+    }
+
+    /// Whether it is a figure of an estimate.
+    pub(in crate::study) fn is_of_estimate(self) -> bool {
+        self.origin().is_estimate()
+    }
+
     /// Whether runs of this base have this measure.
     pub(super) fn is_available_for(self, base: &BaseSpec) -> bool {
         if matches!(base, BaseSpec::Gains { .. }) {
@@ -344,9 +377,9 @@ impl Measure {
             Origin::EstimateWallClock => matches!(base, BaseSpec::Journey { timing: None, .. }),
             Origin::Estimate if self != Self::PositionRmseM => matches!(base, BaseSpec::Journey { timing: None, .. }),
             Origin::Map => matches!(base, BaseSpec::Journey { timing: Some(_), .. }),
-            Origin::AnyMap => Self::ClockErrorS.is_available_for(base) || Self::ReferenceRmseM.is_available_for(base),
+            Origin::Cloud => matches!(base, BaseSpec::Journey { timing: None, .. }),
             Origin::Reference => matches!(base, BaseSpec::Journey { reference: Some(_), .. }),
-            Origin::Estimate | Origin::Swing => matches!(base, BaseSpec::Journey { .. }),
+            Origin::Estimate | Origin::AnyMap | Origin::Swing => matches!(base, BaseSpec::Journey { .. }),
         }
     }
 }

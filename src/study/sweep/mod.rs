@@ -67,6 +67,7 @@ pub use repeat::RepeatedRun;
 pub use report::MergedReport;
 pub use run::Shard;
 pub use runner::Runner;
+pub(super) use simulated_run::journey_figures;
 pub use spec::{AxisSpec, LevelSpec, Sampling, Setting, SweepSpec};
 pub use suite::SuiteRecording;
 pub use summary::{LevelSummary, RatioToFirst, SIGNIFICANCE_LEVEL, Summary, Trend};

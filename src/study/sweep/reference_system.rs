@@ -73,28 +73,6 @@ impl ReferenceMap {
     pub(super) fn is_of(&self, inputs: &ReferenceInputs, journey: &Journey) -> bool {
         self.inputs == *inputs && self.estimator == journey.estimator.spec
     }
-
-    /// Compares the cloud of an estimate with this map and with the true surfaces.
-    ///
-    /// # Errors
-    /// If the recording cannot be read, or if the run is stopped.
-    pub(super) fn compare(
-        &self,
-        recording: &RunRecording,
-        estimates: &Estimates,
-        simulation: &Simulation,
-        watch: &ProgressMonitor,
-    ) -> Result<CloudComparison, StudyError> {
-        let aligned = AlignedCloud::new(recording, estimates, simulation, MAX_POINTS, watch)?;
-        let summary =
-            |surface: &dyn Surface, points: &[SeenPoint]| CloudErrors::to_surface(surface, points, REACH_M).summary();
-        Ok(CloudComparison {
-            to_reference: summary(&self.cloud, &aligned.estimated),
-            to_truth: summary(simulation.world(), &aligned.estimated),
-            by_truth: summary(simulation.world(), &aligned.by_truth),
-            reference_rmse_m: self.rmse_m,
-        })
-    }
 }
 
 /// A point in the world and the position of the sensor, m.
@@ -135,15 +113,37 @@ impl AlignedCloud {
     }
 }
 
-/// Distances of a cloud to the map of a reference system and to the true surfaces.
+/// Distances of a cloud to the true surfaces, and to the map of a reference system if there is one.
 pub(super) struct CloudComparison {
     to_reference: Option<CloudSummary>,
     to_truth: Option<CloudSummary>,
     by_truth: Option<CloudSummary>,
-    reference_rmse_m: f64,
+    reference_rmse_m: Option<f64>,
 }
 
 impl CloudComparison {
+    /// Compares the cloud of an estimate.
+    ///
+    /// # Errors
+    /// If the recording cannot be read, if it cannot be aligned with the truth, or if the run is stopped.
+    pub(super) fn new(
+        recording: &RunRecording,
+        estimates: &Estimates,
+        simulation: &Simulation,
+        reference: Option<&ReferenceMap>,
+        watch: &ProgressMonitor,
+    ) -> Result<Self, StudyError> {
+        let aligned = AlignedCloud::new(recording, estimates, simulation, MAX_POINTS, watch)?;
+        let summary =
+            |surface: &dyn Surface, points: &[SeenPoint]| CloudErrors::to_surface(surface, points, REACH_M).summary();
+        Ok(Self {
+            to_reference: reference.and_then(|reference| summary(&reference.cloud, &aligned.estimated)),
+            to_truth: summary(simulation.world(), &aligned.estimated),
+            by_truth: summary(simulation.world(), &aligned.by_truth),
+            reference_rmse_m: reference.map(|reference| reference.rmse_m),
+        })
+    }
+
     pub(super) fn figure(&self, measure: Measure) -> Option<f64> {
         let sigma_m = |of: Option<CloudSummary>| of.map(|summary| summary.sigma_m);
         match measure {
@@ -152,7 +152,7 @@ impl CloudComparison {
             Measure::CloudOverTruth => sigma_m(self.to_truth).zip(sigma_m(self.by_truth)).map(|(of, by)| of / by),
             Measure::ReferenceSigmaM => sigma_m(self.to_reference),
             Measure::ReferenceBiasM => self.to_reference.map(|summary| summary.bias_m),
-            Measure::ReferenceRmseM => Some(self.reference_rmse_m),
+            Measure::ReferenceRmseM => self.reference_rmse_m,
             _ => None,
         }
     }

@@ -1,7 +1,7 @@
 //! Runs that are simulated, recorded and estimated.
 
 use super::Measure;
-use super::estimated_run::{RunInputs, estimate};
+use super::estimated_run::{EstimateMetrics, RunInputs, estimate};
 use super::measure::Origin;
 use super::part::RunOutcome;
 use super::reference_inputs::ReferenceInputs;
@@ -97,8 +97,7 @@ impl TemporaryRecording {
         reader: usize,
     ) -> Result<Compared, StudyError> {
         let needs_bound = measures.contains(&Measure::ErrorOverSlamBound);
-        let needs_reference =
-            measures.iter().any(|measure| matches!(measure.origin(), Origin::Reference | Origin::AnyMap));
+        let needs_reference = measures.iter().any(|measure| measure.origin() == Origin::Reference);
         let reference = run.reference.as_ref().filter(|_| needs_reference);
         Ok(Compared {
             slam_bound_m: if needs_bound { self.slam_bound_m(limit, reader)? } else { None },
@@ -116,44 +115,51 @@ impl TemporaryRecording {
         compared: &Compared,
     ) -> Result<RunOutcome, StudyError> {
         let measures = &plan.spec().measures;
-        let needs = |origin: Origin| measures.iter().any(|measure| measure.origin() == origin);
-        let swing = match needs(Origin::Swing) || needs(Origin::SwingOrClosedForm) {
-            true => Some(self.swing()?),
-            false => None,
-        };
-        let (mut estimated, mut map_errors) = (None, None);
-        let estimates = measures.iter().any(|measure| measure.origin().is_estimate());
-        if let Some(handle) = self.handles.get(reader).filter(|_| estimates) {
-            let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
-            match &run.timing {
-                None => {
-                    let slam_bound_m = compared.slam_bound_m;
-                    let inputs = RunInputs {
-                        simulation: &self.simulation,
-                        journey: run,
-                        closes_loops: measures.iter().any(|measure| measure.needs_closed_loop()),
-                        slam_bound_m,
-                        reference: compared.reference.as_deref(),
-                    };
-                    estimated = Some(with_time_limit(limit, |stop| estimate(file, &inputs, stop))?);
-                }
-                Some(timing) => {
-                    let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
-                    map_errors = Some(with_time_limit(limit, work)?);
-                }
-            }
-        }
-        let figure = |measure: &Measure| {
-            let by_swing = swing.as_ref().and_then(|swing| swing_figure(*measure, swing));
-            let by_map = || map_errors.as_ref().and_then(|errors| timing::figure(errors, *measure));
-            by_swing.or_else(by_map).or_else(|| estimated.as_ref().and_then(|estimated| estimated.figure(*measure)))
-        };
+        let results = self.results(measures, limit, run, reader, compared)?;
         let has_curve = measures.iter().any(|measure| measure.has_clock_curve());
-        let curve = estimated.as_ref().filter(|_| has_curve).and_then(|estimated| estimated.clock_curve.as_ref());
-        let details = map_errors.as_ref().map(spec::to_text).or_else(|| curve.map(spec::to_text)).transpose()?;
-        let figures = plan.result_measures().iter().map(figure).collect();
-        let times = plan.time_measures().iter().skip(1).map(figure).collect();
+        let estimated = results.estimated.as_ref().filter(|_| has_curve);
+        let curve = estimated.and_then(|estimated| estimated.clock_curve.as_ref());
+        let map_errors = results.map_errors.as_ref();
+        let details = map_errors.map(spec::to_text).or_else(|| curve.map(spec::to_text)).transpose()?;
+        let figures = plan.result_measures().iter().map(|measure| results.figure(*measure)).collect();
+        let times = plan.time_measures().iter().skip(1).map(|measure| results.figure(*measure)).collect();
         Ok(RunOutcome { figures, times, details, ..RunOutcome::default() })
+    }
+
+    /// Computes what `measures` need.
+    fn results(
+        &self,
+        measures: &[Measure],
+        limit: LimitSpec,
+        run: &Journey,
+        reader: usize,
+        compared: &Compared,
+    ) -> Result<JourneyResults, StudyError> {
+        let any = |of: fn(Measure) -> bool| measures.iter().any(|measure| of(*measure));
+        let swings = any(|measure| matches!(measure.origin(), Origin::Swing | Origin::SwingOrClosedForm));
+        let swing = swings.then(|| self.swing()).transpose()?;
+        let mut results = JourneyResults { swing, estimated: None, map_errors: None };
+        let Some(handle) = self.handles.get(reader).filter(|_| any(|measure| measure.origin().is_estimate())) else {
+            return Ok(results);
+        };
+        let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
+        if let Some(timing) = &run.timing {
+            let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
+            results.map_errors = Some(with_time_limit(limit, work)?);
+        } else {
+            let clouds =
+                |measure: Measure| matches!(measure.origin(), Origin::AnyMap | Origin::Cloud | Origin::Reference);
+            let inputs = RunInputs {
+                simulation: &self.simulation,
+                journey: run,
+                closes_loops: any(Measure::needs_closed_loop),
+                slam_bound_m: compared.slam_bound_m,
+                compares_clouds: any(clouds),
+                reference: compared.reference.as_deref(),
+            };
+            results.estimated = Some(with_time_limit(limit, |stop| estimate(file, &inputs, stop))?);
+        }
+        Ok(results)
     }
 
     /// Estimates with timing errors on one thread, and evaluates the result.
@@ -252,6 +258,42 @@ impl TemporaryRecording {
     }
 }
 
+/// The figures of one journey without timing errors or a reference system, simulated and estimated on this thread; `None` for
+/// a figure that does not exist.
+///
+/// # Errors
+/// If the specs do not make a simulation, or if it or the estimate fails or exceeds its time limit.
+pub(in crate::study) fn journey_figures(
+    journey: &Journey,
+    measures: &[Measure],
+    limit: LimitSpec,
+) -> Result<Vec<Option<f64>>, StudyError> {
+    let recorded = measures.iter().any(|measure| measure.origin().is_estimate());
+    let simulation = Simulation::build(journey.simulation.clone())?;
+    let mut figures = Vec::new();
+    for recording in record_simulations(vec![simulation], recorded, 1, limit)? {
+        let compared = recording.compared_with(limit, measures, journey, 0)?;
+        let results = recording.results(measures, limit, journey, 0, &compared)?;
+        figures.extend(measures.iter().map(|measure| results.figure(*measure)));
+    }
+    Ok(figures)
+}
+
+/// What was computed for the measures of a journey.
+struct JourneyResults {
+    swing: Option<Swing>,
+    estimated: Option<EstimateMetrics>,
+    map_errors: Option<MapErrors>,
+}
+
+impl JourneyResults {
+    fn figure(&self, measure: Measure) -> Option<f64> {
+        let by_swing = self.swing.as_ref().and_then(|swing| swing_figure(measure, swing));
+        let by_map = || self.map_errors.as_ref().and_then(|errors| timing::figure(errors, measure));
+        by_swing.or_else(by_map).or_else(|| self.estimated.as_ref().and_then(|estimated| estimated.figure(measure)))
+    }
+}
+
 /// What a run is compared with.
 struct Compared {
     /// Information bound with an unknown map, m.
@@ -269,12 +311,14 @@ struct Swing {
 fn swing_figure(measure: Measure, Swing { coverage, coil_contact_s }: &Swing) -> Option<f64> {
     match measure {
         Measure::FractionSeen => Some(coverage.fraction_seen),
+        Measure::FractionSeen1S => coverage.fraction_in_1s,
         Measure::CoveredS => Some(coverage.covered_s),
         Measure::DensityPerSrS => Some(coverage.density_per_sr_s.mean),
         Measure::FieldOfViewDeg => Some(coverage.field_of_view_deg),
         Measure::RateDegPerS => Some(coverage.gyro.most_deg_per_s),
         Measure::RateP99DegPerS => Some(coverage.gyro.p99_deg_per_s),
         Measure::Saturated => Some(coverage.gyro.saturated),
+        Measure::GyroRangeLeft => Some(coverage.gyro.range_left()),
         Measure::CoilContactS => Some(*coil_contact_s),
         _ => None,
     }

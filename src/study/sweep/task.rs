@@ -7,8 +7,8 @@ use super::simulated_run::{MAX_RECORDINGS, TemporaryRecording, record_simulation
 use super::{LimitSpec, Sweep};
 use crate::simulation::Simulation;
 use crate::study::StudyError;
+use crate::study::threads::for_each_on_threads;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Message from a worker to its supervisor, one line on stdout: `begin 7`, `done 7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,28 +156,15 @@ impl Sweep {
         threads: usize,
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
-        let next = AtomicUsize::new(0);
-        let read = |reader: usize| {
-            while let Some((recording, (unit, run))) = runs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                if self.is_done(&self.units[*unit])? {
-                    report(WorkerMessage::Done(*unit));
-                    continue;
-                }
+        for_each_on_threads(runs.len(), threads, |reader, index| {
+            let (recording, (unit, run)) = runs[index];
+            if !self.is_done(&self.units[*unit])? {
                 report(WorkerMessage::Begin(*unit));
                 let outcome = recording.evaluate(&self.plan, limit, &run.inputs, reader);
                 self.write_part(&self.units[*unit], &[outcome])?;
-                report(WorkerMessage::Done(*unit));
             }
-            Ok::<(), StudyError>(())
-        };
-        std::thread::scope(|scope| {
-            let read = &read;
-            let readers: Vec<_> =
-                (0..threads.min(runs.len())).map(|reader| scope.spawn(move || read(reader))).collect();
-            readers.into_iter().try_for_each(|reader| match reader.join() {
-                Ok(result) => result,
-                Err(panic) => std::panic::resume_unwind(panic),
-            })
+            report(WorkerMessage::Done(*unit));
+            Ok(())
         })
     }
 

@@ -32,6 +32,13 @@ pub(in crate::study) struct Journey {
     pub ignore_manifest: bool,
 }
 
+impl Journey {
+    /// A simulation with an estimator, without timing errors.
+    pub(in crate::study) fn new(simulation: Run, estimator: Named<EstimatorSpec>) -> Self {
+        Self { simulation, estimator, timing: None, reference: None, ignore_manifest: false }
+    }
+}
+
 /// Inputs of a closed form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ClosedForm {
@@ -195,7 +202,9 @@ impl Tree {
     /// # Errors
     /// A message if a value is invalid.
     pub fn closed_form(&self) -> Result<ClosedForm, String> {
-        read(self.0.clone())
+        let inputs: ClosedForm = read(self.0.clone())?;
+        inputs.shake.check()?;
+        Ok(inputs)
     }
 
     /// The inputs of a gain measurement.

@@ -6,7 +6,7 @@ use crate::dynamics::{HeadSpec, LinkageSpec, stands_with_mass};
 use crate::elasticity::ElasticityError;
 use crate::spec::Source;
 use crate::study::spring::{DesignMetrics, StressCycle, Wire, closed_form};
-use crate::study::sweep::Measure;
+use crate::study::sweep::{GoalSpec, Measure};
 use serde::Serialize;
 
 /// A feasible design.
@@ -16,7 +16,7 @@ pub struct Candidate {
     pub coil: CoilDesign,
     /// Metrics in closed form.
     pub figures: DesignMetrics,
-    /// Cost for each goal; lower is better.
+    /// Cost for each goal, until a journey for each goal with a closed form; lower is better.
     pub costs: Vec<f64>,
 }
 
@@ -57,11 +57,11 @@ impl Evaluator {
             Err(_) => return Evaluation::Invalid("geometry"),
         }
         let head = self.head_on(coil);
-        let Ok(figures) = closed_form(&head, &self.source, &self.spec.shake) else {
+        let Ok(figures) = closed_form(&head, &self.source, &self.spec.shake, self.spec.build.mission_hours) else {
             return Evaluation::Invalid("stable rest pose");
         };
         let mut violations = self.violations(coil, &figures);
-        let unknown = self.spec.goals.iter().filter(|goal| figures.figure(goal.measure).is_none());
+        let unknown = self.goals().filter(|goal| figures.figure(goal.measure).is_none());
         violations.extend(unknown.map(|goal| Violation { limit: goal.measure.key(), value: None, excess: 1.0 }));
         // The tipping margin takes as long as all others, so it is the last.
         if violations.is_empty() && !self.keeps_tipping_margin(&head) {
@@ -70,8 +70,13 @@ impl Evaluator {
         if !violations.is_empty() {
             return Evaluation::Infeasible(violations);
         }
-        let costs = self.spec.goals.iter().map(|goal| goal.cost(figures.cost_figure(goal.measure))).collect();
+        let costs = self.goals().map(|goal| goal.cost(figures.cost_figure(goal.measure))).collect();
         Evaluation::Feasible(Box::new(Candidate { coil: coil.clone(), figures, costs }))
+    }
+
+    /// The goals with a closed form.
+    pub fn goals(&self) -> impl Iterator<Item = &GoalSpec> {
+        self.spec.goals.iter().filter(|goal| goal.measure.has_closed_form())
     }
 
     fn keeps_tipping_margin(&self, head: &HeadSpec) -> bool {
@@ -87,8 +92,7 @@ impl Evaluator {
             let excess = limit.excess(value);
             (excess > 0.0).then(|| Violation { limit: limit.measure.key(), value: Some(value), excess })
         });
-        let shake_hz = self.spec.shake.frequency_hz.unwrap_or(metrics.rocking_hz);
-        of_measures.chain(self.spec.build.violations(&coil.spring(), metrics, shake_hz)).collect()
+        of_measures.chain(self.spec.build.violations(&coil.spring(), metrics)).collect()
     }
 
     /// The limits that cannot be checked for a spring of this wire.

@@ -2,7 +2,7 @@
 
 use crate::elasticity::{SpringDesign, SpringSpec};
 use crate::spec::checked;
-use crate::study::spring::{DesignMetrics, SpringMargins, Wire};
+use crate::study::spring::{DesignMetrics, MISSION_HOURS, Wire};
 use serde::{Deserialize, Serialize};
 
 /// Limits of a spring that can be ordered and lasts; each has a default.
@@ -93,7 +93,7 @@ impl Default for BuildLimitsSpec {
             buckling_margin: 2.0,
             yield_margin: 1.2,
             fatigue_margin: 1.2,
-            mission_hours: 1000.0,
+            mission_hours: MISSION_HOURS,
         }
     }
 }
@@ -116,17 +116,10 @@ impl WireStock {
 }
 
 impl BuildLimitsSpec {
-    /// Margin of the stress cycle of a wire over the mission, at the frequency of the shake; `None` if it is not known.
-    pub fn fatigue_margin_of(&self, wire: &Wire, margins: &SpringMargins, shake_hz: f64) -> Option<f64> {
-        let cycles = self.mission_hours * 3600.0 * shake_hz;
-        wire.fatigue_margin(&margins.cycle?, cycles)
-    }
-
     /// The limits that a spring with these metrics violates, except the tipping margin.
     ///
-    /// `shake_hz` is the frequency of the shake. A margin that is not known is no violation; the
-    /// design says so in `unchecked`.
-    pub fn violations(&self, spring: &SpringSpec, metrics: &DesignMetrics, shake_hz: f64) -> Vec<Violation> {
+    /// A margin that is not known is no violation; the design says so in `unchecked`.
+    pub fn violations(&self, spring: &SpringSpec, metrics: &DesignMetrics) -> Vec<Violation> {
         let (Ok(Some(wire)), Ok(SpringDesign::Coil(coil))) = (Wire::of(spring), spring.design()) else {
             return Vec::new();
         };
@@ -139,7 +132,7 @@ impl BuildLimitsSpec {
             ("solid_margin", margins.solid, self.solid_margin),
             ("buckling_margin", margins.buckling, self.buckling_margin),
             ("yield_margin", margins.yielding, self.yield_margin),
-            ("fatigue_margin", self.fatigue_margin_of(&wire, margins, shake_hz), self.fatigue_margin),
+            ("fatigue_margin", metrics.fatigue_margin, self.fatigue_margin),
         ];
         let too_little = least.into_iter().filter_map(|(limit, value, least)| {
             let value = value.filter(|value| *value < least)?;

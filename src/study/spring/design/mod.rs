@@ -5,11 +5,16 @@
 //! runs of CMA-ES (Hansen 2016, crate `cmaes`) minimise the goals with different weights. The scalarisation is that of
 //! Chebyshev, which also finds concave fronts. The Pareto set is taken from all evaluated designs; an evenly distributed
 //! selection of it is verified by full simulations. Designs that cannot be made, clash or break are rejected.
+//!
+//! Goals without a closed form need a journey: an evenly distributed selection of the feasible designs is simulated and
+//! estimated, and the Pareto set of all goals is taken from it.
 
 mod catalogue;
 mod evaluation;
+mod journey;
 mod limits;
 mod optimise;
+mod outcome;
 mod output;
 mod search;
 mod space;
@@ -20,4 +25,4 @@ pub use evaluation::Candidate;
 pub use limits::{BuildLimitsSpec, Violation, WireStock};
 pub use output::{csv, pareto_figure, rejected_csv};
 pub use search::{DesignSearch, DesignStudy, Exploration, Rejection, VerifiedDesign};
-pub use spec::{CoilDesign, DesignSpec, SpaceSpec};
+pub use spec::{CoilDesign, DesignSpec, JourneySpec, SpaceSpec};

@@ -1,8 +1,10 @@
 //! Search: exploration of the design space, Pareto set and verification.
 
 use super::evaluation::{Candidate, Evaluation, Evaluator};
+use super::journey::Journeys;
 use super::limits::Violation;
 use super::optimise::{Scales, optimise, weights};
+use super::outcome::Outcomes;
 use super::space::Space;
 use super::spec::{CoilDesign, DesignSpec};
 use crate::dynamics::{HeadSpec, LinkageSpec};
@@ -12,7 +14,7 @@ use crate::spec::{Kind, Source, SpecError, find_from, parse};
 use crate::study::coverage::CoveragePlan;
 use crate::study::progress::PieceProgress;
 use crate::study::spring::{DesignMetrics, Wire, simulated};
-use crate::study::sweep::{pareto_set, spread};
+use crate::study::sweep::{Measure, pareto_set, spread};
 use crate::study::{OnProgress, StudyError};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -27,14 +29,22 @@ pub struct VerifiedDesign {
     pub candidate: Candidate,
     /// Metrics by simulation.
     pub simulated: DesignMetrics,
-    /// Margin of the stress cycle in the simulation over the mission; `None` if the strength of the wire is unknown.
-    pub fatigue_margin: Option<f64>,
+    /// Metrics of the journeys, means over the seeds; empty without a journey.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub journey: BTreeMap<Measure, f64>,
     /// Limits that cannot be checked: the strength of the wire is not known, or a cable carries a part of the load.
     pub unchecked: Vec<&'static str>,
     /// Fraction of the sphere that the lidar covered.
     pub fraction_seen: f64,
     /// Fraction of the time in which the gyroscope was saturated.
     pub saturated: f64,
+}
+
+impl VerifiedDesign {
+    /// The figure for goals: in closed form, or of the journeys; infinite if it is not known.
+    pub fn cost_figure(&self, measure: Measure) -> f64 {
+        self.journey.get(&measure).copied().unwrap_or_else(|| self.candidate.figures.cost_figure(measure))
+    }
 }
 
 /// A design that is not within the limits.
@@ -72,6 +82,13 @@ pub struct DesignStudy {
     pub cloud: Vec<(f64, f64)>,
 }
 
+impl DesignStudy {
+    /// The measures that the candidates have of their journeys.
+    pub fn journey_measures(&self) -> Vec<Measure> {
+        self.candidates.first().map_or(Vec::new(), |design| design.journey.keys().copied().collect())
+    }
+}
+
 /// Result of the exploration of a design space.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Exploration {
@@ -87,9 +104,10 @@ pub struct Exploration {
 
 /// A search for a spring.
 pub struct DesignSearch {
-    evaluator: Evaluator,
+    pub(super) evaluator: Evaluator,
     lidar: Lidar,
     space: Space,
+    journeys: Option<Journeys>,
 }
 
 /// Number of runs of CMA-ES, each with different weights of the goals.
@@ -97,6 +115,10 @@ const OPTIMISER_RUNS: usize = 16;
 
 /// Fraction of the evaluations for the initial uniform sampling.
 const SAMPLED_FRACTION: f64 = 0.4;
+
+/// Fractions of the progress for the exploration, without and with journeys.
+const EXPLORED: f64 = 0.5;
+const EXPLORED_WITH_JOURNEYS: f64 = 0.05;
 
 /// Maximum number of simulated designs over the number of requested candidates: rejected ones are replaced.
 const MAX_SIMULATED: usize = 4;
@@ -118,15 +140,8 @@ impl DesignSearch {
         if spec.goals.is_empty() {
             return Err(SpecError::about(source, "goals", "at least one goal is required").into());
         }
-        let measures = spec.goals.iter().map(|goal| goal.measure).chain(spec.limits.iter().map(|limit| limit.measure));
-        if let Some(measure) = measures.into_iter().find(|measure| !measure.has_closed_form()) {
-            let message = format!(
-                "{} has no closed form, so it cannot be a goal or a limit: remove it, or compare springs by it in a sweep with \
-                 `front` (as specs/studies/spring_sweep.ron)",
-                measure.key()
-            );
-            return Err(SpecError::about(source, measure.key(), message).into());
-        }
+        check_measures(spec, source)?;
+        spec.shake.check().map_err(|message| SpecError::about(source, "frequency_hz", message))?;
         if spec.evaluations == 0 || spec.candidates == 0 {
             return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
@@ -139,10 +154,12 @@ impl DesignSearch {
                 return Err(SpecError::about(source, key, message).into());
             }
         }
-        Ok(Self { evaluator: Evaluator { spec: spec.clone(), head, source: head_source }, lidar, space })
+        let load = |journey| Journeys::load(journey, spec, measures(spec), source);
+        let journeys = spec.journey.as_ref().map(load).transpose()?;
+        Ok(Self { evaluator: Evaluator { spec: spec.clone(), head, source: head_source }, lidar, space, journeys })
     }
 
-    fn spec(&self) -> &DesignSpec {
+    pub(super) fn spec(&self) -> &DesignSpec {
         &self.evaluator.spec
     }
 
@@ -172,9 +189,12 @@ impl DesignSearch {
 
     /// Evaluates uniform samples of the unit cube, and then what the optimiser tries.
     fn sample_and_optimise(&self, evaluate: &(dyn Fn(&[f64]) -> Evaluation + Sync)) -> Vec<Evaluation> {
-        let (seed, evaluations, goals) = (Seed(self.spec().seed), self.spec().evaluations, self.spec().goals.len());
+        let (seed, evaluations, goals) =
+            (Seed(self.spec().seed), self.spec().evaluations, self.evaluator.goals().count());
         let mut stream = seed.stream("design/samples");
-        let samples = ((evaluations as f64 * SAMPLED_FRACTION) as usize).max(1);
+        // Without a goal in closed form there is nothing to optimise before the journeys.
+        let sampled_fraction = if goals == 0 { 1.0 } else { SAMPLED_FRACTION };
+        let samples = ((evaluations as f64 * sampled_fraction) as usize).max(1);
         let points: Vec<[f64; 4]> = (0..samples).map(|_| std::array::from_fn(|_| stream.random::<f64>())).collect();
         let sampled: Vec<Evaluation> = points.par_iter().map(|point| evaluate(point)).collect();
         let scales = Scales::of(&sampled, goals);
@@ -193,32 +213,48 @@ impl DesignSearch {
 
     /// Explores the design space and verifies a selection of the Pareto set.
     ///
-    /// A design that is outside the limits in the simulation is replaced by another one of the set. The first half of the
-    /// progress is the exploration, the second half the verification.
+    /// A design that is outside the limits in the simulation is replaced by another one of the set. The first part of the
+    /// progress is the exploration, the second the simulations.
     ///
     /// # Errors
-    /// When the verification cannot be set up.
+    /// When the simulations cannot be set up.
     pub fn run(&self, on_progress: OnProgress<'_>) -> Result<DesignStudy, StudyError> {
-        let mut found = self.explore(&|fraction| on_progress(0.5 * fraction));
-        let costs: Vec<Vec<f64>> = found.feasible.iter().map(|candidate| candidate.costs.clone()).collect();
-        let front = pareto_set(&costs);
-        let metric = |k: usize| self.spec().goals.get(k).or(self.spec().goals.first()).map(|goal| goal.measure);
-        let cloud = metric(0).zip(metric(1)).map_or(Vec::new(), |(x, y)| {
-            found.feasible.iter().map(|c| (c.figures.cost_figure(x), c.figures.cost_figure(y))).collect()
-        });
-        let (candidates, failed) =
-            self.verify_selection(&found.feasible, &front, &|fraction| on_progress(0.5 + 0.5 * fraction))?;
-        found.rejections.extend(failed);
+        let explored = if self.journeys.is_some() { EXPLORED_WITH_JOURNEYS } else { EXPLORED };
+        let mut found = self.explore(&|fraction| on_progress(explored * fraction));
+        let simulating = |fraction| on_progress(explored + (1.0 - explored) * fraction);
+        let outcomes = match &self.journeys {
+            Some(journeys) => self.outcomes(journeys, &found.feasible, &simulating)?,
+            None => self.verified_front(&found.feasible, &simulating)?,
+        };
+        found.rejections.extend(outcomes.rejections);
         Ok(DesignStudy {
             spec: self.spec().clone(),
             evaluated: found.evaluated,
             feasible: found.feasible.len(),
             rejected: found.rejected,
-            pareto: front.len(),
-            candidates,
+            pareto: outcomes.pareto,
+            candidates: outcomes.candidates,
             rejections: found.rejections,
-            cloud,
+            cloud: outcomes.cloud,
         })
+    }
+
+    /// The measures of the first two goals, or twice that of a single goal.
+    pub(super) fn first_two_goals(&self) -> Option<[Measure; 2]> {
+        let goals = &self.spec().goals;
+        let first = goals.first()?.measure;
+        Some([first, goals.get(1).map_or(first, |goal| goal.measure)])
+    }
+
+    /// The Pareto set in closed form, and verified designs of it.
+    fn verified_front(&self, feasible: &[Candidate], on_progress: OnProgress<'_>) -> Result<Outcomes, StudyError> {
+        let costs: Vec<Vec<f64>> = feasible.iter().map(|candidate| candidate.costs.clone()).collect();
+        let front = pareto_set(&costs);
+        let cloud = self.first_two_goals().map_or(Vec::new(), |goals| {
+            feasible.iter().map(|c| goals.map(|goal| c.figures.cost_figure(goal)).into()).collect()
+        });
+        let (candidates, rejections) = self.verify_selection(feasible, &front, on_progress)?;
+        Ok(Outcomes { candidates, pareto: front.len(), rejections, cloud })
     }
 
     /// Simulates evenly distributed designs of `front` until enough of them are within the limits.
@@ -255,34 +291,55 @@ impl DesignSearch {
     }
 
     /// Simulates a design; returns the verified design, or the limit that it violates.
-    fn verify(&self, candidate: &Candidate) -> Result<Result<VerifiedDesign, Rejection>, StudyError> {
+    pub(super) fn verify(&self, candidate: &Candidate) -> Result<Result<VerifiedDesign, Rejection>, StudyError> {
         let plan = CoveragePlan { from_s: 10.0, duration_s: 10.0, ..CoveragePlan::default() };
         let (coil, spec) = (&candidate.coil, self.spec());
         let head = self.evaluator.head_on(coil);
-        let (metrics, coverage) = match simulated(&head, &self.evaluator.source, &spec.shake, &self.lidar, &plan) {
-            Ok(result) => result,
-            Err(StudyError::Dynamics(error)) => {
-                let limit = format!("simulation: {error}");
-                return Ok(Err(Rejection { coil: coil.clone(), simulated: true, limit, value: None }));
-            }
-            Err(error) => return Err(error),
-        };
+        let (metrics, coverage) =
+            match simulated(&head, &self.evaluator.source, &spec.shake, &self.lidar, &plan, spec.build.mission_hours) {
+                Ok(result) => result,
+                Err(StudyError::Dynamics(error)) => {
+                    let limit = format!("simulation: {error}");
+                    return Ok(Err(Rejection { coil: coil.clone(), simulated: true, limit, value: None }));
+                }
+                Err(error) => return Err(error),
+            };
         if let Some(worst) = Violation::worst(&self.evaluator.violations(coil, &metrics)) {
             let (limit, value) = (worst.limit.to_owned(), worst.value);
             return Ok(Err(Rejection { coil: coil.clone(), simulated: true, limit, value }));
         }
         let wire = Wire::of(&coil.spring())?;
-        let shake_hz = spec.shake.frequency_hz.unwrap_or(metrics.rocking_hz);
-        let fatigue_margin = wire.and_then(|wire| spec.build.fatigue_margin_of(&wire, &metrics.margins, shake_hz));
         Ok(Ok(VerifiedDesign {
             candidate: candidate.clone(),
             simulated: metrics,
-            fatigue_margin,
+            journey: BTreeMap::new(),
             unchecked: wire.map_or(Vec::new(), |wire| self.evaluator.unchecked(&wire)),
             fraction_seen: coverage.fraction_seen,
             saturated: coverage.gyro.saturated,
         }))
     }
+}
+
+/// The measures of the goals and limits of a search.
+fn measures(spec: &DesignSpec) -> impl Iterator<Item = Measure> {
+    spec.goals.iter().map(|goal| goal.measure).chain(spec.limits.iter().map(|limit| limit.measure))
+}
+
+/// Checks that goals and limits have figures.
+fn check_measures(spec: &DesignSpec, source: &Source) -> Result<(), SpecError> {
+    for measure in measures(spec) {
+        let key = measure.key();
+        let message = match (measure.has_closed_form(), measure.needs_journey()) {
+            (true, _) => continue,
+            (false, true) if spec.journey.is_some() => continue,
+            (false, true) => format!(
+                "{key} is a figure of a journey: add `journey: (scene: ..., ...)` (as specs/studies/spring_office.ron)"
+            ),
+            (false, false) => format!("{key} cannot be a goal or a limit of a spring search: remove it"),
+        };
+        return Err(SpecError::about(source, key, message));
+    }
+    Ok(())
 }
 
 impl Exploration {

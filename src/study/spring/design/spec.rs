@@ -17,6 +17,9 @@ pub struct DesignSpec {
     pub lidar: String,
     /// Motion of the base for field of view, rate and stress.
     pub shake: Shake,
+    /// A journey that measures without a closed form are taken from, such as coverage in a second or the accuracy of the map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub journey: Option<JourneySpec>,
     /// Design space.
     pub space: SpaceSpec,
     /// Goals; the search returns the Pareto set of them.
@@ -33,6 +36,38 @@ pub struct DesignSpec {
     pub candidates: usize,
     /// Random seed.
     pub seed: u64,
+}
+
+/// A journey with the head and the lidar of a spring search. Each spec is a path or a name in the library.
+///
+/// The figures of a design are means over the seeds. A design whose coils touch in a journey, or whose estimate is lost, is
+/// rejected.
+#[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct JourneySpec {
+    /// Scene.
+    pub scene: String,
+    /// Motion of the base.
+    pub motion: String,
+    /// Inertial measurement unit.
+    pub imu: String,
+    /// Clocks of the sensors.
+    pub clock: String,
+    /// Settings of the estimator.
+    pub estimator: String,
+    /// Route in the scene; the scene's default route if omitted.
+    #[serde(default)]
+    pub route: Option<String>,
+    /// Duration, s.
+    #[serde(with = "checked::Positive")]
+    pub duration_s: f64,
+    /// Random seeds; each is a journey.
+    pub seeds: Vec<u64>,
+    /// Number of designs whose journeys are simulated: evenly distributed feasible designs.
+    pub designs: usize,
+    /// Time limit of a simulation and of an estimate, s.
+    #[serde(with = "checked::Positive")]
+    pub time_limit_s: f64,
 }
 
 /// Design space of a spring search.

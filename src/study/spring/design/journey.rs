@@ -1,0 +1,95 @@
+//! Journeys of a search: what a spring means for coverage, gyroscope and map.
+
+use super::spec::{DesignSpec, JourneySpec};
+use crate::dynamics::HeadSpec;
+use crate::estimation::Status;
+use crate::random::Seed;
+use crate::simulation::{Named, Run, Scenario};
+use crate::spec::{Source, SpecError, name_from};
+use crate::study::StudyError;
+use crate::study::sweep::{Journey, LimitSpec, Measure, journey_figures};
+use std::collections::BTreeMap;
+
+/// The journeys of the heads of a search, one per seed.
+pub(super) struct Journeys {
+    journeys: Vec<Journey>,
+    /// The measures of goals and limits, the verdict if there is an estimate, and the contact of coils.
+    measures: Vec<Measure>,
+    limit: LimitSpec,
+    /// Number of designs to simulate.
+    pub designs: usize,
+}
+
+/// Figures of a design: means over its journeys.
+pub(super) type JourneyFigures = BTreeMap<Measure, f64>;
+
+impl Journeys {
+    /// The journeys in `spec`, a part of `design` that is read from `source`, for figures of `measures`.
+    ///
+    /// # Errors
+    /// If a spec is missing or invalid, or if there are no seeds or designs.
+    pub fn load(
+        spec: &JourneySpec,
+        design: &DesignSpec,
+        measures: impl Iterator<Item = Measure>,
+        source: &Source,
+    ) -> Result<Self, StudyError> {
+        if spec.seeds.is_empty() || spec.designs == 0 {
+            return Err(SpecError::about(source, "journey", "at least one seed and one design are required").into());
+        }
+        let named = |name: &String| name_from(source, name);
+        let estimator = Named::load(&named(&spec.estimator))?;
+        let of_seed = |seed: &u64| {
+            let scenario = Scenario {
+                scene: named(&spec.scene),
+                head: named(&design.head),
+                motion: named(&spec.motion),
+                lidar: named(&design.lidar),
+                imu: named(&spec.imu),
+                clock: named(&spec.clock),
+                base_imu: None,
+                faults: None,
+                route: spec.route.clone(),
+                duration_s: spec.duration_s,
+                seed: Seed(*seed),
+            };
+            Ok(Journey::new(Run::load(&scenario)?, estimator.clone()))
+        };
+        let mut measures: Vec<Measure> = measures.filter(|measure| measure.needs_journey()).collect();
+        if measures.iter().any(|measure| measure.is_of_estimate()) {
+            measures.push(Measure::Status);
+        }
+        measures.push(Measure::CoilContactS);
+        measures.sort_unstable();
+        measures.dedup();
+        Ok(Self {
+            journeys: spec.seeds.iter().map(of_seed).collect::<Result<_, StudyError>>()?,
+            measures,
+            limit: LimitSpec { time_s: spec.time_limit_s, memory_mib: u64::MAX },
+            designs: spec.designs,
+        })
+    }
+
+    /// Simulates and estimates the journeys of a head on this thread.
+    ///
+    /// # Errors
+    /// If a journey cannot be simulated or estimated, or exceeds its time limit, or if an estimate is lost.
+    pub fn figures(&self, head: &HeadSpec) -> Result<JourneyFigures, StudyError> {
+        let mut figures = JourneyFigures::new();
+        for journey in &self.journeys {
+            let mut journey = journey.clone();
+            journey.simulation.head.spec = head.clone();
+            let values = journey_figures(&journey, &self.measures, self.limit)?;
+            for (measure, value) in self.measures.iter().zip(values) {
+                let is_lost = *measure == Measure::Status && value == Some(f64::from(Status::Lost as u8));
+                let Some(value) = value.filter(|_| !is_lost) else {
+                    let Seed(seed) = journey.simulation.seed;
+                    let what = if is_lost { "lost estimate".to_owned() } else { format!("no {}", measure.key()) };
+                    return Err(StudyError::Plan { what: "journey", message: format!("{what} (seed {seed})") });
+                };
+                *figures.entry(*measure).or_default() += value / self.journeys.len() as f64;
+            }
+        }
+        Ok(figures)
+    }
+}

@@ -1,0 +1,109 @@
+//! Search by outcome: designs are compared by what the map of a journey is worth.
+
+use super::evaluation::Candidate;
+use super::journey::Journeys;
+use super::limits::Violation;
+use super::search::{DesignSearch, Rejection, VerifiedDesign};
+use crate::study::progress::PieceProgress;
+use crate::study::sweep::{Measure, pareto_set, spread};
+use crate::study::threads::for_each_on_threads;
+use crate::study::{OnProgress, StudyError};
+use std::sync::{Mutex, PoisonError};
+
+/// Designs with their journeys.
+pub(super) struct Outcomes {
+    /// The Pareto set of all goals, evenly distributed designs of it.
+    pub candidates: Vec<VerifiedDesign>,
+    /// Number of designs in the Pareto set.
+    pub pareto: usize,
+    pub rejections: Vec<Rejection>,
+    /// Figures of the first two goals for each design within all limits.
+    pub cloud: Vec<(f64, f64)>,
+}
+
+impl DesignSearch {
+    /// Simulates evenly distributed designs, first under the shake, then in the journeys, and selects the Pareto set of all
+    /// goals.
+    ///
+    /// # Errors
+    /// When a simulation cannot be set up.
+    pub(super) fn outcomes(
+        &self,
+        journeys: &Journeys,
+        feasible: &[Candidate],
+        on_progress: OnProgress<'_>,
+    ) -> Result<Outcomes, StudyError> {
+        // A journey depends on how the head swings, so designs differ in that too.
+        let features = |candidate: &Candidate| {
+            let swing = [Measure::RockingHz, Measure::FieldOfViewDeg, Measure::RateDegPerS];
+            let swing = swing.map(|measure| candidate.figures.cost_figure(measure));
+            candidate.costs.iter().copied().chain(swing).collect::<Vec<f64>>()
+        };
+        let chosen = spread(&feasible.iter().map(features).collect::<Vec<_>>(), journeys.designs);
+        let pieces = PieceProgress::new(chosen.len(), on_progress);
+        let results = Mutex::new(vec![None; chosen.len()]);
+        for_each_on_threads(chosen.len(), rayon::current_num_threads(), |_, k| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+            let result = pool.install(|| self.travel(journeys, &feasible[chosen[k]]))?;
+            results.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(result);
+            pieces.finish_one();
+            Ok::<(), StudyError>(())
+        })?;
+        let (mut verified, mut rejections) = (Vec::new(), Vec::new());
+        for result in results.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten() {
+            match result {
+                Ok(design) => verified.push(design),
+                Err(rejection) => rejections.push(rejection),
+            }
+        }
+        let costs = |designs: &[VerifiedDesign]| designs.iter().map(|design| design.candidate.costs.clone()).collect();
+        let cloud = self.first_two_goals().map_or(Vec::new(), |goals| {
+            let figures = |design: &VerifiedDesign| goals.map(|goal| design.cost_figure(goal)).into();
+            verified.iter().map(figures).collect()
+        });
+        let all: Vec<Vec<f64>> = costs(&verified);
+        let front: Vec<VerifiedDesign> = pareto_set(&all).into_iter().map(|k| verified[k].clone()).collect();
+        let selected = spread(&costs(&front), self.spec().candidates);
+        let candidates = selected.into_iter().map(|k| front[k].clone()).collect();
+        Ok(Outcomes { candidates, pareto: front.len(), rejections, cloud })
+    }
+
+    /// Simulates a design under the shake and in the journeys; returns it with its costs for all goals, or the limit that it
+    /// violates.
+    fn travel(
+        &self,
+        journeys: &Journeys,
+        candidate: &Candidate,
+    ) -> Result<Result<VerifiedDesign, Rejection>, StudyError> {
+        let mut design = match self.verify(candidate)? {
+            Ok(design) => design,
+            Err(rejection) => return Ok(Err(rejection)),
+        };
+        let coil = &candidate.coil;
+        let reject =
+            |limit: String, value: Option<f64>| Rejection { coil: coil.clone(), simulated: true, limit, value };
+        design.journey = match journeys.figures(&self.evaluator.head_on(coil)) {
+            Ok(figures) => figures,
+            Err(error @ StudyError::File { .. }) => return Err(error),
+            Err(error) => return Ok(Err(reject(error.to_string(), None))),
+        };
+        let contact_s = design.journey.get(&Measure::CoilContactS).copied().filter(|contact_s| *contact_s > 0.0);
+        let contact = contact_s.map(|contact_s| Violation {
+            limit: Measure::CoilContactS.key(),
+            value: Some(contact_s),
+            excess: f64::INFINITY,
+        });
+        let of_measures = self.spec().limits.iter().filter_map(|limit| {
+            let value = *design.journey.get(&limit.measure)?;
+            let excess = limit.excess(value);
+            (excess > 0.0).then(|| Violation { limit: limit.measure.key(), value: Some(value), excess })
+        });
+        let violations: Vec<Violation> = of_measures.chain(contact).collect();
+        if let Some(worst) = Violation::worst(&violations) {
+            return Ok(Err(reject(worst.limit.to_owned(), worst.value)));
+        }
+        let goals = self.spec().goals.iter();
+        design.candidate.costs = goals.map(|goal| goal.cost(design.cost_figure(goal.measure))).collect();
+        Ok(Ok(design))
+    }
+}
