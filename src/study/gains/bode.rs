@@ -9,6 +9,9 @@ use std::f64::consts::{PI, TAU};
 /// The lower edge of a band is at least this fraction of the gain: a logarithmic axis has no zero.
 pub(super) const LOWEST_SHARE: f64 = 0.01;
 
+/// Ratio of gains above which an axis has ticks at powers of ten only.
+const MANY_DECADES: f64 = 300.0;
+
 /// Gain and phase in three rows, rotations first: measurement as dots with 95 % bands, closed form as lines.
 pub fn gain_figure(curves: &[GainCurve]) -> Figure {
     let rows = PANELS.iter().flat_map(|(title, label, axes)| {
@@ -24,7 +27,10 @@ fn over_frequency(title: &str, label: &str) -> Chart {
 }
 
 fn gain_chart(title: &str, label: &str, curves: &[&GainCurve]) -> Chart {
-    let chart = over_frequency(title, label).with_y_ticks(ticks(-9..=6, &[1.0]));
+    let gains = || curves.iter().flat_map(|curve| &curve.points).map(|p| p.gain).filter(|gain| *gain > 0.0);
+    let (least, largest) = (gains().fold(f64::INFINITY, f64::min), gains().fold(0.0, f64::max));
+    let multiples: &[f64] = if largest > MANY_DECADES * least { &[1.0] } else { &[1.0, 2.0, 5.0] };
+    let chart = over_frequency(title, label).with_y_ticks(ticks(-9..=6, multiples));
     let point = |freq_hz: f64, gain: f64| (gain > 0.0).then(|| (freq_hz.log10(), gain.log10()));
     curves.iter().fold(chart, |chart, curve| {
         let (name, colour) = style(curve.axis);

@@ -212,9 +212,7 @@ impl Measure {
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop, RMS (mm)", "mm", 1e3)
             }
-            Self::ErrorOverSlamBound => {
-                ("error_over_slam_bound", "error/bound", "Ratio of closed-loop error to bound", "1", 1.0)
-            }
+            Self::ErrorOverSlamBound => ("error_over_slam_bound", "error/bound", "Closed loop over bound", "1", 1.0),
             Self::Status => ("status", "status", "Verdict (0 good, 1 degraded, 2 lost)", "1", 1.0),
             Self::AlignedRmseM => {
                 ("aligned_rmse_m", "aligned", "Position error, aligned over the first 20 s, RMS (mm)", "mm", 1e3)
@@ -231,17 +229,13 @@ impl Measure {
             Self::ReferenceSigmaM => {
                 ("reference_sigma_m", "from reference", "Standard deviation from the reference cloud (mm)", "mm", 1e3)
             }
-            Self::ReferenceBiasM => {
-                ("reference_bias_m", "reference bias", "Bias from the reference cloud (mm)", "mm", 1e3)
-            }
+            Self::ReferenceBiasM => ("reference_bias_m", "reference bias", "Bias from the reference (mm)", "mm", 1e3),
             Self::ReferenceRmseM => {
                 ("reference_rmse_m", "reference", "Position error of the reference, RMS (mm)", "mm", 1e3)
             }
             Self::ClockErrorS => ("clock_error_s", "clock error", "Clock offset error at the end (ms)", "ms", 1e3),
             Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
-            Self::FractionSeen1S => {
-                ("fraction_seen_1s", "in 1 s", "Observed fraction of the sphere in a second (%)", "%", 1e2)
-            }
+            Self::FractionSeen1S => ("fraction_seen_1s", "in 1 s", "Coverage in a second (%)", "%", 1e2),
             Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
             Self::DensityPerSrS => ("density_per_sr_s", "density", "Beam density (1/sr/s)", "1/sr/s", 1.0),
             Self::FieldOfViewDeg => ("field_of_view_deg", "view", "Field of view (°)", "deg", 1.0),
