@@ -23,8 +23,8 @@ use zsim::study;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim base results/office/closed_loop.tum --head handheld --truth \
                         results/office/recording.mcap\n  zsim --scene office --base-imu 3dm_gx2 --out \
-                        results/two_imus\n  zsim base results/two_imus/closed_loop.tum --head handheld --base-imu \
-                        results/two_imus/recording.mcap")]
+                        results/imus\n  zsim base results/imus/closed_loop.tum --head handheld --base-imu \
+                        results/imus/recording.mcap")]
 pub(super) struct Arguments {
     /// Trajectory of the head
     #[arg(value_name = "HEAD.tum")]
