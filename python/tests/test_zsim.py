@@ -221,7 +221,7 @@ def processor_s():
     "minutes_long",
     [
         lambda: zsim.simulate(scene="office", duration_s=36000.0),
-        lambda: zsim.Spring("handheld").gains(realisations=500),
+        lambda: zsim.Spring("handheld").gains(realisations=400),
     ],
 )
 def test_an_interrupt_stops_a_computation(minutes_long):
