@@ -8,22 +8,15 @@ use numpy::{AllowTypeChange, PyArrayLike1, PyArrayLike2};
 use pyo3::prelude::*;
 use zsim::estimation::{self, EstimatedPose, Warning};
 use zsim::geometry;
-use zsim::measurement::{ImuSample, LidarReturn, LidarScan, Measurement};
+use zsim::measurement::{ForceUnitCheck, ImuSample, LidarReturn, LidarScan, Measurement};
 use zsim::time::Stamp;
-
-/// Number of samples from which the unit of the specific force is judged.
-const UNIT_SAMPLES: usize = 100;
-
-/// Median norms of specific forces that are in multiples of gravity.
-const ONE_G: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// The open-loop estimator.
 #[pyclass(module = "zsim")]
 pub struct Estimator {
     /// `None` after the end.
     running: Option<estimation::Estimator>,
-    /// Norms of the first specific forces from the caller, m/s^2.
-    first_forces: Vec<f64>,
+    unit: ForceUnitCheck,
     warnings: Vec<String>,
 }
 
@@ -33,7 +26,7 @@ impl Estimator {
     #[pyo3(signature = (calibration, estimator="default"))]
     fn new(calibration: &Calibration, estimator: &str) -> Result<Self, Failure> {
         let running = estimation::Estimator::new(&estimation::load(estimator)?, &calibration.0)?;
-        Ok(Self { running: Some(running), first_forces: Vec::new(), warnings: Vec::new() })
+        Ok(Self { running: Some(running), unit: ForceUnitCheck::default(), warnings: Vec::new() })
     }
 
     /// Adds an IMU sample: stamp on the IMU's clock, ns; rad/s and m/s^2 in the frame of the IMU.
@@ -48,7 +41,7 @@ impl Estimator {
             angular_velocity_rad_per_s: angular_velocity_rad_per_s.into(),
             specific_force_m_per_s2: specific_force_m_per_s2.into(),
         };
-        self.check_unit(&sample)?;
+        self.unit.add(&sample).map_err(Failure::input)?;
         Ok(self.running()?.push(Measurement::Imu(sample))?)
     }
 
@@ -103,25 +96,6 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// Fails if the first samples are in multiples of gravity: the estimate would be wrong.
-    fn check_unit(&mut self, sample: &ImuSample) -> Result<(), Failure> {
-        if self.first_forces.len() == UNIT_SAMPLES {
-            return Ok(());
-        }
-        self.first_forces.push(sample.specific_force_m_per_s2.norm());
-        let mut sorted = self.first_forces.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let median = sorted[sorted.len() / 2];
-        if sorted.len() == UNIT_SAMPLES && ONE_G.contains(&median) {
-            let message = format!(
-                "specific_force_m_per_s2: the median norm of the first {UNIT_SAMPLES} samples is {median:.2}; gravity alone is \
-                 9.81 m/s^2: multiply accelerations in g by 9.80665"
-            );
-            return Err(Failure::input(message));
-        }
-        Ok(())
-    }
-
     fn running(&mut self) -> Result<&mut estimation::Estimator, Failure> {
         self.running.as_mut().ok_or_else(ended)
     }

@@ -3,10 +3,12 @@
 //! Stamps are from the sensors' own clocks: an [`ImuSample`] has IMU time, a [`LidarScan`] lidar time.
 
 mod calibration;
+mod force_unit;
 mod imu;
 mod lidar;
 
 pub use calibration::{Calibration, ImuNoise, LidarCorrection, LidarNoise};
+pub use force_unit::ForceUnitCheck;
 pub use imu::{ImuAveraging, ImuSample};
 pub use lidar::{LidarReturn, LidarScan, PlanarScan};
 

@@ -1,9 +1,9 @@
 //! Gain and phase over frequency on logarithmic axes.
 
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
-use super::figure::{PANELS, style};
+use super::figure::{PANELS, dot_size, style};
 use super::{GainCurve, GainPoint};
-use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, Tick};
+use crate::report::plot::{BandPoint, Chart, Figure, Mark, Series, Tick};
 use std::f64::consts::{PI, TAU};
 
 /// The lower edge of a band is at least this fraction of the gain: a logarithmic axis has no zero.
@@ -66,11 +66,6 @@ fn phase_chart(label: &str, curves: &[&GainCurve]) -> Chart {
         let dots = Series::dots(name, colour, dots.collect()).marked(Mark::Dots(dot_size(colour)));
         chart.with(Series::line("", colour, line).marked(Mark::Line(1.0))).with(dots)
     })
-}
-
-/// Size of the dots: x and y of a round spring coincide, and the curve drawn first has larger ones.
-pub(super) fn dot_size(colour: Colour) -> f64 {
-    if colour == Colour::Estimate { 4.5 } else { 2.5 }
 }
 
 /// Ticks at these multiples of powers of ten, at their logarithms.

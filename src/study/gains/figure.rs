@@ -1,6 +1,5 @@
 //! Figures of gain curves.
 
-use super::bode::dot_size;
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingPoint, SwingStudy};
 use crate::motion::Axis;
@@ -81,6 +80,11 @@ pub fn swing_figure(studies: &[SwingStudy]) -> Figure {
         chart("Peak gain, 95 % band", |p| p.peak.map(|peak| peak.gain), |p| p.peak_gain_sigma).starting_at_zero(),
         chart("Coherence at the peak", |p| p.coherence, |_| None),
     ])
+}
+
+/// Size of the dots: x and y of a round spring coincide, and the curve drawn first has larger ones.
+pub(super) fn dot_size(colour: Colour) -> f64 {
+    if colour == Colour::Estimate { 4.5 } else { 2.5 }
 }
 
 /// Name and colour of an axis's curve.

@@ -19,10 +19,12 @@ mod output;
 mod search;
 mod space;
 mod spec;
+mod verified;
 
 pub use catalogue::{STOCK, catalogue};
 pub use evaluation::Candidate;
 pub use limits::{BuildLimitsSpec, Violation, WireStock};
 pub use output::{csv, pareto_figure, rejected_csv};
-pub use search::{DesignSearch, DesignStudy, Exploration, Rejection, VerifiedDesign};
+pub use search::{DesignSearch, DesignStudy, Exploration};
 pub use spec::{CoilDesign, DesignSpec, JourneySpec, SpaceSpec};
+pub use verified::{Rejection, VerifiedDesign};

@@ -3,23 +3,13 @@
 use super::evaluation::Candidate;
 use super::journey::Journeys;
 use super::limits::Violation;
-use super::search::{DesignSearch, Rejection, VerifiedDesign};
+use super::search::DesignSearch;
+use super::verified::{Outcomes, Rejection, VerifiedDesign};
 use crate::study::progress::PieceProgress;
 use crate::study::sweep::{Measure, pareto_set, spread};
 use crate::study::threads::for_each_on_threads;
 use crate::study::{OnProgress, StudyError};
 use std::sync::{Mutex, PoisonError};
-
-/// Designs with their journeys.
-pub(super) struct Outcomes {
-    /// The Pareto set of all goals, evenly distributed designs of it.
-    pub candidates: Vec<VerifiedDesign>,
-    /// Number of designs in the Pareto set.
-    pub pareto: usize,
-    pub rejections: Vec<Rejection>,
-    /// Figures of the first two goals for each design within all limits.
-    pub cloud: Vec<(f64, f64)>,
-}
 
 impl DesignSearch {
     /// Simulates evenly distributed designs, first under the shake, then in the journeys, and selects the Pareto set of all

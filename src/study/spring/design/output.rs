@@ -1,7 +1,8 @@
 //! Result of a search as CSV and as a plot.
 
-use super::search::{DesignStudy, VerifiedDesign};
+use super::search::DesignStudy;
 use super::spec::CoilDesign;
+use super::verified::VerifiedDesign;
 use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
 use crate::study::spring::DesignMetrics;
 use crate::study::sweep::{Measure, quoted};
