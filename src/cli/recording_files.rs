@@ -48,7 +48,8 @@ impl RecordingFiles {
     /// permits to replace them. No file of `inputs` is ever replaced.
     ///
     /// # Errors
-    /// When the ending is that of another format, two of the files would be one, an input would be replaced, or they cannot be created.
+    /// When the ending is that of another format, two of the files would be one, an input would be replaced, or they cannot be
+    /// created.
     pub fn reserve(wanted: &Path, companions: &[Companion], force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
         if let Some(same) = Companion::ALL.iter().find(|companion| is_same_name(&companion.of(wanted), wanted)) {
             let message = format!(

@@ -1,6 +1,6 @@
 //! The gap between the coils of a bent spring.
 
-use super::head::{HeadModel, Linkage};
+use super::head::HeadModel;
 use super::mounted_spring::MountedSpring;
 use crate::elasticity::{ElasticityError, SpringState};
 use crate::geometry::{Pose, Vector};
@@ -23,11 +23,7 @@ pub struct CoilGaps<'a> {
 impl<'a> CoilGaps<'a> {
     /// The gaps of `model`.
     pub fn of(model: &'a HeadModel) -> Self {
-        let springs: &[MountedSpring] = match &model.linkage {
-            Linkage::Compliant(compliant) => &compliant.law.springs,
-            Linkage::Rigid { .. } | Linkage::Actuated(_) => &[],
-        };
-        Self { springs: springs.iter().map(|mounted| (mounted, mounted.spring.state())).collect() }
+        Self { springs: model.springs_with_states() }
     }
 
     /// The smallest gap of each spring with the head at a pose; `None` as for [`smallest`](Self::smallest).

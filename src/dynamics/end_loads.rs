@@ -1,6 +1,6 @@
 //! Loads on the ends of the springs of a head.
 
-use super::head::{HeadModel, Linkage};
+use super::head::HeadModel;
 use super::mounted_spring::MountedSpring;
 use crate::elasticity::{ElasticityError, SpringState, split};
 use crate::geometry::{Pose, Vector};
@@ -25,11 +25,7 @@ pub struct SpringEndLoads<'a> {
 impl<'a> SpringEndLoads<'a> {
     /// The loads on the springs of `model`.
     pub fn of(model: &'a HeadModel) -> Self {
-        let springs: &[MountedSpring] = match &model.linkage {
-            Linkage::Compliant(compliant) => &compliant.law.springs,
-            Linkage::Rigid { .. } | Linkage::Actuated(_) => &[],
-        };
-        Self { springs: springs.iter().map(|mounted| (mounted, mounted.spring.state())).collect() }
+        Self { springs: model.springs_with_states() }
     }
 
     /// The loads on foot and top of each spring with the head at a pose; `None` where a segmented spring has no equilibrium.
@@ -57,6 +53,7 @@ impl MountedSpring {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::head::Linkage;
     use crate::dynamics::load;
     use crate::geometry::gravity_in_world;
 

@@ -8,9 +8,10 @@ use super::error::DynamicsError;
 use super::forces::MotionState;
 use super::modes::{LinearModel, Mode};
 use super::mount::{CompliantMount, LinkageOptions, Mount};
+use super::mounted_spring::MountedSpring;
 use super::spec::{HeadSpec, LinkageSpec};
 use super::statics::NoEquilibrium;
-use crate::elasticity::{ElasticityError, stack};
+use crate::elasticity::{ElasticityError, SpringState, stack};
 use crate::geometry::{Kinematics, Pose, gravity_in_world};
 use crate::spec::{Source, SpecError};
 
@@ -102,6 +103,15 @@ impl HeadModel {
             Linkage::Actuated(_) => Some("a motor turns the head: there is no spring, hence nothing to characterise"),
             Linkage::Compliant(_) => None,
         }
+    }
+
+    /// The springs, each with a state for the solutions of its inner nodes.
+    pub(super) fn springs_with_states(&self) -> Vec<(&MountedSpring, SpringState)> {
+        let springs: &[MountedSpring] = match &self.linkage {
+            Linkage::Compliant(compliant) => &compliant.law.springs,
+            Linkage::Rigid { .. } | Linkage::Actuated(_) => &[],
+        };
+        springs.iter().map(|mounted| (mounted, mounted.spring.state())).collect()
     }
 
     /// The model linearised about the equilibrium; `None` for a rigid or actuated mount.

@@ -5,8 +5,8 @@ use super::ImuSample;
 /// Number of samples from which the unit is judged.
 const SAMPLES: usize = 100;
 
-/// Median norms that are in multiples of gravity, if the numbers were m/s^2.
-const ONE_G: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+/// Median norms of specific forces that are in multiples of gravity.
+pub const ONE_G_RANGE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// Judges by the first samples whether specific forces are in m/s^2.
 #[derive(Debug, Clone, Default)]
@@ -29,7 +29,7 @@ impl ForceUnitCheck {
         }
         self.norms.sort_unstable_by(f64::total_cmp);
         let median = self.norms[SAMPLES / 2];
-        if ONE_G.contains(&median) {
+        if ONE_G_RANGE.contains(&median) {
             return Err(format!(
                 "specific_force_m_per_s2: the median norm of the first {SAMPLES} samples is {median:.2}; gravity alone is \
                  9.81 m/s^2: multiply accelerations in g by 9.80665"

@@ -8,7 +8,7 @@ mod imu;
 mod lidar;
 
 pub use calibration::{Calibration, ImuNoise, LidarCorrection, LidarNoise};
-pub use force_unit::ForceUnitCheck;
+pub use force_unit::{ForceUnitCheck, ONE_G_RANGE};
 pub use imu::{ImuAveraging, ImuSample};
 pub use lidar::{LidarReturn, LidarScan, PlanarScan};
 

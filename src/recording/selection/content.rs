@@ -2,7 +2,7 @@
 //!
 //! The content is acceleration, angular velocity or both, the unit of acceleration, and whether gravity is included.
 
-use crate::measurement::ImuSample;
+use crate::measurement::{ImuSample, ONE_G_RANGE};
 use crate::recording::message::imu::ForceUnit;
 
 /// Minimum number of samples for a decision.
@@ -17,9 +17,8 @@ const MIN_DURATION_S: f64 = 10.0;
 /// Averaging time of the specific force, s.
 const AVERAGING_S: f64 = 1.0;
 
-/// Median norm above which the unit is certainly m/s^2, and median norms that may be in g.
+/// Median norm above which the unit is certainly m/s^2.
 const MIN_CERTAIN_M_PER_S2: f64 = 4.0;
-const ONE_G_RANGE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
 /// Quantities that the messages of an IMU topic contain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,8 @@ use crate::dynamics::{CoilGap, EndLoad, HeadModel, HeadState, SpringEndLoads};
 use crate::elasticity::{Coil, SectionLoad, buckling_load_n};
 use serde::Serialize;
 
-/// Margins of a coil spring over the observed states, of several springs the smallest: what is available over what is needed; above 1 is safe.
+/// Margins of a coil spring over the observed states, of several springs the smallest: what is available over what is needed;
+/// above 1 is safe.
 ///
 /// `None` for a quantity that is unknown, or that is not loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -204,17 +205,20 @@ mod tests {
     use crate::study::coverage::CoveragePlan;
     use approx::assert_relative_eq;
 
+    fn utm30lx() -> Lidar {
+        let source = find(Kind::Lidar, "utm30lx").unwrap();
+        Lidar::new(&parse(&source).unwrap(), &source).unwrap()
+    }
+
     #[test]
     fn the_margins_of_a_small_swing_follow_from_its_bending_moment() {
         // At its resonance the handheld head pitches by the gain times 0.1 degrees; its field of view is twice that. The
         // moment at the foot is that of the weight and of the inertia, which the elastic moment of the bent spring balances.
         let (spec, source) = load("handheld").unwrap();
         let shake = Shake { pitch_deg: 0.1, frequency_hz: None };
-        let lidar_source = find(Kind::Lidar, "utm30lx").unwrap();
-        let lidar = Lidar::new(&parse(&lidar_source).unwrap(), &lidar_source).unwrap();
         let plan = CoveragePlan { from_s: 15.0, duration_s: 3.0, ..CoveragePlan::default() };
         let linear = closed_form(&spec, &source, &shake, MISSION_HOURS).unwrap();
-        let (full, _) = simulated(&spec, &source, &shake, &lidar, &plan, MISSION_HOURS).unwrap();
+        let (full, _) = simulated(&spec, &source, &shake, &utm30lx(), &plan, MISSION_HOURS).unwrap();
         // The gap by the loads (d'Alembert) and by the force law of the deflected spring are computed independently.
         let closed = |gap_mm: f64| (120.0 - 36.0 - 0.86) / 12.0 - gap_mm;
         let (by_loads, by_law) = (closed(linear.margins.gap_mm.unwrap()), closed(full.margins.gap_mm.unwrap()));
@@ -264,10 +268,8 @@ mod tests {
             };
         }
         let shake = Shake { pitch_deg: 0.5, frequency_hz: None };
-        let lidar_source = find(Kind::Lidar, "utm30lx").unwrap();
-        let lidar = Lidar::new(&parse(&lidar_source).unwrap(), &lidar_source).unwrap();
         let plan = CoveragePlan { from_s: 15.0, duration_s: 2.0, ..CoveragePlan::default() };
-        let margins = |spec| simulated(spec, &source, &shake, &lidar, &plan, MISSION_HOURS).unwrap().0;
+        let margins = |spec| simulated(spec, &source, &shake, &utm30lx(), &plan, MISSION_HOURS).unwrap().0;
         let (one, several) = (margins(&single), margins(&suspended));
         let pairs = [
             (one.margins.gap_mm, several.margins.gap_mm),

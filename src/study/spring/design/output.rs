@@ -94,10 +94,16 @@ pub fn pareto_figure(study: &DesignStudy) -> Figure {
     let figure = |k: usize| study.spec.goals.get(k).or(study.spec.goals.first()).map(|goal| goal.measure);
     let (Some(x), Some(y)) = (figure(0), figure(1)) else { return Figure::of(Vec::new()) };
     let cloud = study.cloud.iter().map(|(a, b)| (a * x.unit().1, b * y.unit().1)).collect();
+    // Thousands of designs in closed form, tens with journeys.
+    let is_by_journeys = study.spec.journey.is_some();
     let chart = Chart::new("Pareto set of the springs within limits", x.label(), y.label());
-    let chart = chart.with(Series::dots("feasible", Colour::Backdrop, cloud).marked(Mark::Dots(1.5)));
+    let chart = chart.with(Series::dots("feasible", Colour::Backdrop, cloud).marked(Mark::Dots(if is_by_journeys {
+        3.0
+    } else {
+        1.5
+    })));
     let designs = || study.candidates.iter();
-    let chart = if study.spec.journey.is_some() {
+    let chart = if is_by_journeys {
         let at = |design: &VerifiedDesign| (design.cost_figure(x) * x.unit().1, design.cost_figure(y) * y.unit().1);
         let front = designs().map(at).collect();
         chart.with(Series::dots("Pareto set of all goals", Colour::Estimate, front).marked(Mark::Dots(5.0)))
