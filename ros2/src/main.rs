@@ -7,6 +7,7 @@
 mod frame;
 mod names;
 mod node;
+mod peers;
 mod raw;
 
 use frame::Frame;
@@ -18,16 +19,14 @@ use std::process::ExitCode;
 const WAITING_FRAMES: usize = 64;
 
 fn main() -> ExitCode {
-    let domain = match std::env::args().nth(1).map(|text| text.parse()) {
-        Some(Ok(domain)) => domain,
-        _ => {
-            eprintln!(
-                "error: `zsim play` and `zsim live` start this program; its only argument is a ROS domain, 0 to 232"
-            );
-            return ExitCode::from(2);
-        }
+    let mut arguments = std::env::args().skip(1);
+    let Some(Ok(domain)) = arguments.next().map(|text| text.parse()) else {
+        eprintln!(
+            "error: `zsim play` and `zsim live` start this program; its arguments are a ROS domain, 0 to 232, and peers"
+        );
+        return ExitCode::from(2);
     };
-    match run(domain) {
+    match run(domain, &arguments.collect::<Vec<_>>()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: DDS: {error}");
@@ -36,8 +35,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(domain: u16) -> Result<(), Box<dyn std::error::Error>> {
-    let node = node::Node::new(domain)?;
+fn run(domain: u16, peers: &[String]) -> Result<(), Box<dyn std::error::Error>> {
+    let node = node::Node::new(domain, peers)?;
     let (mut sender, receiver) = mpsc::channel(WAITING_FRAMES);
     std::thread::spawn(move || {
         let mut input = std::io::stdin().lock();

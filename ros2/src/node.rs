@@ -2,6 +2,7 @@
 
 use crate::frame::{Frame, Quality, RosTopic, TopicId};
 use crate::names;
+use crate::peers::Relay;
 use crate::raw::{Message, Raw};
 use futures::channel::mpsc;
 use futures::future::ready;
@@ -51,9 +52,14 @@ pub struct Node {
 }
 
 impl Node {
-    /// Joins `domain`.
-    pub fn new(domain: u16) -> Outcome<Self> {
+    /// Joins `domain`, and announces itself to the `peers`, also where multicast does not reach them.
+    pub fn new(domain: u16, peers: &[String]) -> Outcome<Self> {
+        // Before the participant, whose first announcement comes at once.
+        let relay = if peers.is_empty() { None } else { Some(Relay::new(domain, peers)?) };
         let participant = DomainParticipant::new(domain)?;
+        if let Some(relay) = relay {
+            relay.run(participant.guid().prefix.as_ref().to_vec())?;
+        }
         let qos = QosPolicies::qos_none();
         let (publisher, subscriber) = (participant.create_publisher(&qos)?, participant.create_subscriber(&qos)?);
         Ok(Self { participant, publisher, subscriber, writers: BTreeMap::new(), readers: BTreeMap::new() })

@@ -7,6 +7,7 @@ mod documents;
 mod examples;
 mod gains;
 mod hostile;
+mod hosts;
 mod live;
 mod live_run;
 mod maps;

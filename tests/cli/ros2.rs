@@ -7,10 +7,10 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 /// Arguments that choose the topics of a recording that an estimate needs.
-const TOPICS: &str = "--topic /scan --topic /imu/data_raw --topic /tf_static";
+pub(super) const TOPICS: &str = "--topic /scan --topic /imu/data_raw --topic /tf_static";
 
 /// The folder with the program that connects to DDS; `None`, reported as a skipped check, if it is not built.
-fn bridge() -> Option<PathBuf> {
+pub(super) fn bridge() -> Option<PathBuf> {
     let bridge = Path::new(env!("CARGO_BIN_EXE_zsim")).with_file_name("zsim-ros2");
     if !bridge.is_file() {
         skip("ros2", "zsim-ros2 is not built");
@@ -20,7 +20,7 @@ fn bridge() -> Option<PathBuf> {
 }
 
 /// A simulated recording of `seconds`.
-fn recording(folder: &Path, seconds: u32) -> PathBuf {
+pub(super) fn recording(folder: &Path, seconds: u32) -> PathBuf {
     let arguments = format!("-q simulate --scene mocap_room --duration {seconds}s --seed 4 --out r.mcap");
     assert_eq!(run(folder, &arguments).0, 0);
     folder.join("r.mcap")
@@ -32,12 +32,12 @@ fn start(folder: &Path, arguments: &str) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-fn stop(mut process: Child) {
+pub(super) fn stop(mut process: Child) {
     process.kill().unwrap();
     process.wait().unwrap();
 }
 
-fn json(output: &Output) -> serde_json::Value {
+pub(super) fn json(output: &Output) -> serde_json::Value {
     let text = String::from_utf8_lossy(&output.stdout);
     serde_json::from_str(text.lines().last().filter(|line| line.starts_with('{')).unwrap_or(&text))
         .unwrap_or_else(|error| panic!("{error}: {text} {}", String::from_utf8_lossy(&output.stderr)))
@@ -155,7 +155,7 @@ fn a_live_estimate_of_another_dds_is_published_to_it() {
     }
 }
 
-fn script() -> PathBuf {
+pub(super) fn script() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/check_ros2.py")
 }
 

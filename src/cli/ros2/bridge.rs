@@ -23,11 +23,11 @@ pub(super) struct Bridge {
 }
 
 impl Bridge {
-    /// Starts the program, which joins `domain`.
-    pub(super) fn start(domain: u16) -> anyhow::Result<Self> {
+    /// Starts the program, which joins `domain` and is announced to the `peers`.
+    pub(super) fn start(domain: u16, peers: &[String]) -> anyhow::Result<Self> {
         let path = program()?;
         let mut command = Command::new(&path);
-        command.arg(domain.to_string()).stdin(Stdio::piped()).stdout(Stdio::piped());
+        command.arg(domain.to_string()).args(peers).stdin(Stdio::piped()).stdout(Stdio::piped());
         // Ctrl-C is for zsim, which ends the connection when it has published everything.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);

@@ -1,6 +1,6 @@
 //! `zsim live`: estimate from ROS 2 topics while they are published.
 
-use super::DomainArguments;
+use super::NetworkArguments;
 use super::bridge::Bridge;
 use super::session::{Limits, Session, Setup};
 use super::sources::Sources;
@@ -57,14 +57,14 @@ pub(in crate::cli) struct LiveCommand {
     #[command(flatten)]
     out: OutArguments,
     #[command(flatten)]
-    domain: DomainArguments,
+    network: NetworkArguments,
 }
 
 pub(in crate::cli) fn run(command: &LiveCommand, global: &Global) -> anyhow::Result<Completion> {
     let (spec, given) = (command.estimator.spec()?, calibration(command.calibration.as_deref())?);
     let within = |path: &PathBuf| MapOptions::read(path, command.start, false);
     let map = command.map.as_ref().map(within).transpose()?;
-    let mut bridge = Bridge::start(command.domain.domain()?)?;
+    let mut bridge = Bridge::start(command.network.domain()?, &command.network.peers())?;
     let stop = stop_flag();
     let started = Instant::now();
     let until = command.duration.map(|seconds| started + Duration::from_secs_f64(seconds));

@@ -31,15 +31,20 @@ fn depth_of(type_name: &str) -> u32 {
     if is_large { KEPT_CLOUDS } else { KEPT_MESSAGES }
 }
 
-/// The DDS domain.
+/// Which other programs are discovered.
 #[derive(Args)]
-struct DomainArguments {
+struct NetworkArguments {
     /// ROS domain, 0 to 232 [default: ROS_DOMAIN_ID of the environment, else 0]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=i64::from(MAX_DOMAIN)))]
     domain: Option<u16>,
+    /// A host, by name or IPv4 address, that multicast does not reach; may be repeated [default: ROS_STATIC_PEERS of the
+    /// environment]
+    #[arg(long = "peer", value_name = "HOST")]
+    peers: Vec<String>,
 }
 
-impl DomainArguments {
+impl NetworkArguments {
+    /// The domain.
     fn domain(&self) -> Result<u16, Usage> {
         let from_environment =
             || match std::env::var("ROS_DOMAIN_ID") {
@@ -50,5 +55,15 @@ impl DomainArguments {
                 }),
             };
         self.domain.map_or_else(from_environment, Ok)
+    }
+
+    /// Hosts to which this program is announced.
+    fn peers(&self) -> Vec<String> {
+        if !self.peers.is_empty() {
+            return self.peers.clone();
+        }
+        // As in ROS 2: separated by semicolons.
+        let text = std::env::var("ROS_STATIC_PEERS").unwrap_or_default();
+        text.split(';').map(str::trim).filter(|peer| !peer.is_empty()).map(str::to_owned).collect()
     }
 }

@@ -2,7 +2,7 @@
 
 use super::bridge::Bridge;
 use super::frame::{Frame, Quality, RosTopic, TopicId};
-use super::{DomainArguments, depth_of};
+use super::{NetworkArguments, depth_of};
 use crate::cli::arguments::Global;
 use crate::cli::bars::{WorkBar, stop_flag};
 use crate::cli::completion::Completion;
@@ -50,7 +50,7 @@ pub(in crate::cli) struct PlayCommand {
     #[arg(long)]
     wait: bool,
     #[command(flatten)]
-    domain: DomainArguments,
+    network: NetworkArguments,
 }
 
 pub(in crate::cli) fn run(command: &PlayCommand, global: &Global) -> anyhow::Result<Completion> {
@@ -61,7 +61,7 @@ pub(in crate::cli) fn run(command: &PlayCommand, global: &Global) -> anyhow::Res
     let reader = Reader::open(&command.recording)?;
     let topics = selected(&reader, &command.topics)?;
     let mut player = Player {
-        bridge: Bridge::start(command.domain.domain()?)?,
+        bridge: Bridge::start(command.network.domain()?, &command.network.peers())?,
         ids: topics.keys().cloned().zip(0..).collect(),
         rate: command.rate,
         stop: stop_flag(),
