@@ -1,5 +1,6 @@
 //! Estimates from a recording.
 
+use crate::arguments;
 use crate::arrays::as_python;
 use crate::background;
 use crate::failure::Failure;
@@ -41,7 +42,7 @@ pub fn estimate(
     out: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> Result<Estimate, Failure> {
-    let settings: Settings = serde_json::from_str(settings)?;
+    let settings: Settings = arguments::read(settings)?;
     let calibration =
         settings.calibration.map_or_else(|| Ok(CalibrationSpec::default()), |file| CalibrationSpec::read(&file))?;
     let options = EstimateOptions {

@@ -1,10 +1,11 @@
 //! The estimator, fed by the caller.
 
+use crate::arrays::{rows, stamps_ns};
 use crate::calibration::Calibration;
 use crate::failure::Failure;
 use crate::trajectory::Trajectory;
 use crate::window::Window;
-use numpy::{AllowTypeChange, PyArrayLike1, PyArrayLike2};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use zsim::estimation::{self, EstimatedPose, Warning};
 use zsim::geometry;
@@ -51,10 +52,12 @@ impl Estimator {
         &mut self,
         py: Python<'_>,
         stamp_ns: i64,
-        return_stamp_ns: PyArrayLike1<'_, i64>,
-        point_in_laser_m: PyArrayLike2<'_, f32, AllowTypeChange>,
+        return_stamp_ns: &Bound<'_, PyAny>,
+        point_in_laser_m: &Bound<'_, PyAny>,
     ) -> Result<(), Failure> {
-        let scan = scan(Stamp::from_nanos(stamp_ns), &return_stamp_ns, &point_in_laser_m)?;
+        let stamps = stamps_ns("return_stamp_ns", return_stamp_ns)?;
+        let points = rows::<f32>("point_in_laser_m", point_in_laser_m, 3)?;
+        let scan = scan(Stamp::from_nanos(stamp_ns), &stamps, &points)?;
         let running = self.running()?;
         py.detach(|| running.push(Measurement::Lidar(scan)))?;
         Ok(())
@@ -108,13 +111,13 @@ fn ended() -> Failure {
 /// A scan of returns with their stamps and points; `sent` is the stamp of the lidar itself.
 fn scan(
     sent: Stamp,
-    stamps: &PyArrayLike1<'_, i64>,
-    points: &PyArrayLike2<'_, f32, AllowTypeChange>,
+    stamps: &PyReadonlyArray1<'_, i64>,
+    points: &PyReadonlyArray2<'_, f32>,
 ) -> Result<LidarScan, Failure> {
     let (stamps, points) = (stamps.as_array(), points.as_array());
-    if points.dim() != (stamps.len(), 3) {
-        let (count, shape) = (stamps.len(), points.dim());
-        return Err(Failure::input(format!("{count} stamps need points of shape ({count}, 3); these have {shape:?}")));
+    if points.nrows() != stamps.len() {
+        let (count, rows) = (stamps.len(), points.nrows());
+        return Err(Failure::input(format!("{count} stamps, but {rows} points: expected one stamp per point")));
     }
     let Some(first) = stamps.iter().min().map(|stamp| Stamp::from_nanos(*stamp)) else {
         return Err(Failure::input("a scan needs at least one return"));

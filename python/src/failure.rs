@@ -106,8 +106,6 @@ impl From<TrajectoryError> for Failure {
 
 impl From<serde_json::Error> for Failure {
     fn from(error: serde_json::Error) -> Self {
-        // Arguments arrive as JSON in one line: its column means nothing to the caller.
-        let text = error.to_string();
-        Self::input(text.split(" at line ").next().unwrap_or_default())
+        Self::other(sentences(&error))
     }
 }

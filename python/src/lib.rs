@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_pass_by_value, reason = "PyO3 converts each argument to a value of the function")]
 
+mod arguments;
 mod arrays;
 mod background;
 mod calibration;

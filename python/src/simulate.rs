@@ -1,5 +1,6 @@
 //! Simulations.
 
+use crate::arguments;
 use crate::background;
 use crate::failure::Failure;
 use crate::recording::Recording;
@@ -19,7 +20,7 @@ pub fn simulate(
     overwrite: bool,
     progress: Option<Py<PyAny>>,
 ) -> Result<Recording, Failure> {
-    let scenario: Scenario = serde_json::from_str(scenario)?;
+    let scenario: Scenario = arguments::read(scenario)?;
     let folder = match &path {
         Some(_) => None,
         None => Some(tempfile::tempdir().map_err(|error| Failure::other(format!("no temporary folder: {error}")))?),

@@ -1,5 +1,6 @@
 //! Springs under a head.
 
+use crate::arguments;
 use crate::arrays::{as_python, matrix};
 use crate::background;
 use crate::failure::Failure;
@@ -48,7 +49,7 @@ pub struct Spring {
 impl Spring {
     #[new]
     fn new(py: Python<'_>, settings: &str) -> Result<Self, Failure> {
-        let settings: Settings = serde_json::from_str(settings)?;
+        let settings: Settings = arguments::read(settings)?;
         settings.shake.check().map_err(Failure::input)?;
         let (spec, source) = head(&settings)?;
         let lidar_source = find(Kind::Lidar, &settings.lidar)?;
@@ -94,7 +95,7 @@ impl Spring {
         settings: &str,
         progress: Option<Py<PyAny>>,
     ) -> Result<Bound<'py, PyAny>, Failure> {
-        let settings: GainSettings = serde_json::from_str(settings)?;
+        let settings: GainSettings = arguments::read(settings)?;
         let axes = || AXES.map(axis_name).join(", ");
         let axis = AXES.into_iter().find(|axis| axis_name(*axis) == settings.axis);
         let axis = axis.ok_or_else(|| Failure::input(format!("axis \"{}\": use one of {}", settings.axis, axes())))?;

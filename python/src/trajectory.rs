@@ -1,8 +1,8 @@
 //! Trajectories.
 
-use crate::arrays::{matrix, vector};
+use crate::arrays::{matrix, rows, stamps_ns, vector};
 use crate::failure::Failure;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2};
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use zsim::geometry::{self, Pose, Rotation, Vector};
@@ -17,17 +17,20 @@ pub struct Trajectory(pub geometry::Trajectory);
 impl Trajectory {
     #[new]
     fn new(
-        stamp_ns: PyArrayLike1<'_, i64>,
-        position_m: PyArrayLike2<'_, f64, AllowTypeChange>,
-        quaternion_xyzw: PyArrayLike2<'_, f64, AllowTypeChange>,
+        stamp_ns: &Bound<'_, PyAny>,
+        position_m: &Bound<'_, PyAny>,
+        quaternion_xyzw: &Bound<'_, PyAny>,
     ) -> Result<Self, Failure> {
-        let (stamps, positions, quaternions) = (stamp_ns.as_array(), position_m.as_array(), quaternion_xyzw.as_array());
-        if positions.dim() != (stamps.len(), 3) || quaternions.dim() != (stamps.len(), 4) {
+        let stamps = stamps_ns("stamp_ns", stamp_ns)?;
+        let positions = rows::<f64>("position_m", position_m, 3)?;
+        let quaternions = rows::<f64>("quaternion_xyzw", quaternion_xyzw, 4)?;
+        let (stamps, positions, quaternions) = (stamps.as_array(), positions.as_array(), quaternions.as_array());
+        if positions.nrows() != stamps.len() || quaternions.nrows() != stamps.len() {
             let message = format!(
-                "{} stamps need positions of shape ({0}, 3) and quaternions of shape ({0}, 4); these have {:?} and {:?}",
+                "{} stamps, but {} positions and {} quaternions: expected one of each per pose",
                 stamps.len(),
-                positions.dim(),
-                quaternions.dim()
+                positions.nrows(),
+                quaternions.nrows()
             );
             return Err(Failure::input(message));
         }

@@ -159,7 +159,7 @@ def test_errors_have_the_sentences_of_the_library(tmp_path, recording):
         ({"scene": "nowhere"}, "built in are: "),
         ({"scene": "mocap_room", "head": "nosuch"}, "no such head"),
         ({"scene": "mocap_room", "duration_s": -1.0}, "above 0"),
-        ({"scene": "mocap_room", "seed": -1}, "u64"),
+        ({"scene": "mocap_room", "seed": -1}, "seed: .*u64"),
         ({"scene": "mocap_room", "path": tmp_path / "a.tum"}, "another ending"),
     ]:
         with pytest.raises(zsim.InputError, match=words):
@@ -253,10 +253,23 @@ def test_invalid_arguments_are_errors_that_name_them(tmp_path):
         ("frequency_hz", lambda: zsim.Spring(frequency_hz=0.0)),
         ("head_from_laser", lambda: zsim.Calibration(([math.nan, 0.0, 0.0], pose[1]), pose)),
         ("head_from_imu", lambda: zsim.Calibration(pose, (pose[0], [0.0] * 4))),
+        ("stamp_ns: .* got float64", lambda: zsim.Trajectory([0.0, 0.1], np.zeros((2, 3)), np.ones((2, 4)))),
+        ("stamp_ns: .* largest", lambda: zsim.Trajectory(np.array([2**63], np.uint64), [[0.0] * 3], [pose[1]])),
+        (r"stamp_ns: .* \(1, 2\)", lambda: zsim.Trajectory([[0, 1]], np.zeros((2, 3)), np.ones((2, 4)))),
+        ("position_m: .* got <U1", lambda: zsim.Trajectory([0], [["a", "b", "c"]], [pose[1]])),
+        (r"position_m: .* \(3,\)", lambda: zsim.Trajectory([0], [0.0, 0.0, 0.0], [pose[1]])),
+        ("2 positions", lambda: zsim.Trajectory([0], np.zeros((2, 3)), [pose[1]])),
     ]
     for name, call in invalid:
         with pytest.raises(zsim.InputError, match=name):
             call()
+
+
+def test_integers_of_any_type_are_stamps():
+    pose = ([[0.0, 0.0, 0.0]] * 2, [[0.0, 0.0, 0.0, 1.0]] * 2)
+    for stamps in ([1, 2], np.array([1, 2], np.int32), np.array([1, 2], np.uint64), range(1, 3)):
+        assert zsim.Trajectory(stamps, *pose).stamp_ns.tolist() == [1, 2]
+    assert len(zsim.Trajectory([], np.zeros((0, 3)), np.zeros((0, 4)))) == 0
 
 
 def test_accelerations_in_g_are_refused():
