@@ -148,5 +148,5 @@ fn with_coil(spring: &SpringSpec, changes: &Map<String, Value>) -> Result<Spring
         return Err(Failure::input("coil: the spring is given by its stiffness and has no coil"));
     };
     coil.extend(changes.clone());
-    Ok(serde_json::from_value(value)?)
+    arguments::from(value)
 }
