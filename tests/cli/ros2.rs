@@ -195,5 +195,10 @@ fn without_sensors_a_live_estimate_says_what_is_missing_and_writes_nothing() {
     let (code, _, error) = run(folder.path(), "live --domain 64 --duration 2s --quiet --out live");
     assert_eq!(code, 1);
     assert!(error.contains("a lidar and an IMU") && error.contains("no topics at all"), "{error}");
+    assert!(!error.contains("peer"), "{error}");
+    let (code, _, error) = run(folder.path(), "live --domain 64 --duration 1s --quiet --peer 127.0.0.2");
+    assert!(code == 1 && error.contains("the DDS of a peer must not offer multicast"), "{error}");
+    let (code, _, error) = run(folder.path(), "live --domain 64 --duration 1s --quiet --peer no.such.host.invalid");
+    assert!(code == 1 && error.contains("peer `no.such.host.invalid`"), "{error}");
     assert!(!folder.path().join("live").exists());
 }

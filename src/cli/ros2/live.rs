@@ -71,7 +71,8 @@ pub(in crate::cli) fn run(command: &LiveCommand, global: &Global) -> anyhow::Res
     let preference = TopicPreference { lidar_topic: command.lidar_topic.clone(), imu_topic: command.imu_topic.clone() };
     let bar = WorkBar::new(global, "live");
     let mut sources = Sources::new(preference.clone());
-    let start = gather(&mut bridge, &mut sources, until, || stop.load(Ordering::Relaxed), &bar)?;
+    let hint = command.network.hint();
+    let start = gather(&mut bridge, &mut sources, until, || stop.load(Ordering::Relaxed), hint, &bar)?;
     let sensors = start.finish(&preference, &given)?;
     sensors.selection.notes.iter().for_each(|note| bar.note(note));
     if !sensors.found.from_recording && (given.head_from_laser.is_none() || given.head_from_imu.is_none()) {

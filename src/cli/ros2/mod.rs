@@ -37,8 +37,8 @@ struct NetworkArguments {
     /// ROS domain, 0 to 232 [default: ROS_DOMAIN_ID of the environment, else 0]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=i64::from(MAX_DOMAIN)))]
     domain: Option<u16>,
-    /// A host, by name or IPv4 address, that multicast does not reach; may be repeated [default: ROS_STATIC_PEERS of the
-    /// environment]
+    /// A host, by name or IPv4 address, that multicast does not reach; its DDS must not offer multicast. May be repeated
+    /// [default: ROS_STATIC_PEERS of the environment]
     #[arg(long = "peer", value_name = "HOST")]
     peers: Vec<String>,
 }
@@ -55,6 +55,14 @@ impl NetworkArguments {
                 }),
             };
         self.domain.map_or_else(from_environment, Ok)
+    }
+
+    /// What to check when nothing arrives, as the end of a sentence.
+    fn hint(&self) -> &'static str {
+        if self.peers().is_empty() {
+            return "";
+        }
+        "; the DDS of a peer must not offer multicast (Cyclone DDS: AllowMulticast false, ParticipantIndex auto)"
     }
 
     /// Hosts to which this program is announced.

@@ -108,12 +108,14 @@ pub(super) struct Sensors {
     pub(super) found: FoundCalibration,
 }
 
-/// Waits for both sensors, and gathers their first seconds; fails when `is_stopped`, or after `until`.
+/// Waits for both sensors, and gathers their first seconds; fails when `is_stopped`, or after `until`, with a `hint` at the
+/// end of the error.
 pub(super) fn gather(
     bridge: &mut Bridge,
     sources: &mut Sources,
     until: Option<Instant>,
     is_stopped: impl Fn() -> bool,
+    hint: &str,
     bar: &WorkBar,
 ) -> anyhow::Result<Start> {
     let mut start = Start::new()?;
@@ -124,7 +126,7 @@ pub(super) fn gather(
         if is_stopped() || until.is_some_and(|until| Instant::now() >= until) {
             let waited_s = started.elapsed().as_secs_f64();
             bail!(
-                "no estimate: {missing} did not arrive in {waited_s:.0} s; other programs publish {}",
+                "no estimate: {missing} did not arrive in {waited_s:.0} s; other programs publish {}{hint}",
                 sources.seen()
             );
         }
