@@ -12,18 +12,14 @@ const ROUTED: [&str; 2] = ["10.77.1.2", "10.77.2.2"];
 struct Hosts(Vec<String>);
 
 impl Hosts {
-    /// `names` as namespaces; `None`, reported as a skipped check, where that is not permitted.
+    /// `names` as namespaces. This and all that follows is `None`, reported as a skipped check, where it is not permitted.
     fn new(test: &str, names: &[&str]) -> Option<Self> {
         let mut hosts = Self(Vec::new());
         for name in names {
             let space = format!("zsim-{test}-{name}-{}", std::process::id());
-            let output = run_or_skip("hosts", Command::new("ip").args(["netns", "add", &space]))?;
-            if !output.status.success() {
-                skip("hosts", String::from_utf8_lossy(&output.stderr).trim());
-                return None;
-            }
+            set_up(Command::new("ip").args(["netns", "add", &space]))?;
             hosts.0.push(space);
-            hosts.ip(hosts.0.len() - 1, "link set lo up");
+            hosts.ip(hosts.0.len() - 1, "link set lo up")?;
         }
         Some(hosts)
     }
@@ -31,7 +27,7 @@ impl Hosts {
     /// Two hosts at one cable, which passes multicast.
     fn at_a_cable(test: &str) -> Option<Self> {
         let hosts = Self::new(test, &["a", "b"])?;
-        hosts.connect((0, "10.77.0.1"), (1, "10.77.0.2"));
+        hosts.connect((0, "10.77.0.1"), (1, "10.77.0.2"))?;
         Some(hosts)
     }
 
@@ -39,26 +35,27 @@ impl Hosts {
     fn with_a_router(test: &str) -> Option<Self> {
         let hosts = Self::new(test, &["a", "b", "router"])?;
         for (host, address, gateway) in [(0, ROUTED[0], "10.77.1.1"), (1, ROUTED[1], "10.77.2.1")] {
-            hosts.connect((host, address), (2, gateway));
-            hosts.ip(host, &format!("route add default via {gateway}"));
+            hosts.connect((host, address), (2, gateway))?;
+            hosts.ip(host, &format!("route add default via {gateway}"))?;
         }
-        succeeds(hosts.command(2, "sysctl").args(["-qw", "net.ipv4.ip_forward=1"]));
+        set_up(hosts.command(2, "sysctl").args(["-qw", "net.ipv4.ip_forward=1"]))?;
         Some(hosts)
     }
 
     /// A cable between two namespaces, with the addresses of its ends.
-    fn connect(&self, a: (usize, &str), b: (usize, &str)) {
+    fn connect(&self, a: (usize, &str), b: (usize, &str)) -> Option<()> {
         let (name_of_a, name_of_b) = (format!("to{}", b.0), format!("to{}", a.0));
         let peer = format!("type veth peer name {name_of_b} netns {}", self.0[b.0]);
-        self.ip(a.0, &format!("link add {name_of_a} {peer}"));
+        self.ip(a.0, &format!("link add {name_of_a} {peer}"))?;
         for ((host, address), link) in [(a, name_of_a), (b, name_of_b)] {
-            self.ip(host, &format!("addr add {address}/24 dev {link}"));
-            self.ip(host, &format!("link set {link} up"));
+            self.ip(host, &format!("addr add {address}/24 dev {link}"))?;
+            self.ip(host, &format!("link set {link} up"))?;
         }
+        Some(())
     }
 
-    fn ip(&self, host: usize, arguments: &str) {
-        succeeds(Command::new("ip").args(["-n", &self.0[host]]).args(arguments.split_whitespace()));
+    fn ip(&self, host: usize, arguments: &str) -> Option<()> {
+        set_up(Command::new("ip").args(["-n", &self.0[host]]).args(arguments.split_whitespace()))
     }
 
     /// A program on a host.
@@ -85,9 +82,14 @@ impl Drop for Hosts {
     }
 }
 
-fn succeeds(command: &mut Command) {
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{command:?}: {}", error_of(&output));
+/// Runs a command that prepares the hosts.
+fn set_up(command: &mut Command) -> Option<()> {
+    let output = run_or_skip("hosts", command)?;
+    if !output.status.success() {
+        skip("hosts", error_of(&output).lines().next().unwrap_or_default());
+        return None;
+    }
+    Some(())
 }
 
 fn error_of(output: &Output) -> String {

@@ -44,7 +44,6 @@ struct NetworkArguments {
 }
 
 impl NetworkArguments {
-    /// The domain.
     fn domain(&self) -> Result<u16, Usage> {
         let from_environment =
             || match std::env::var("ROS_DOMAIN_ID") {
