@@ -62,24 +62,18 @@
 //!
 //! Simulation and estimation do not depend on each other; the test `tests/architecture.rs` enforces this.
 
-pub mod dynamics;
-pub mod elasticity;
-pub mod estimation;
-pub mod evaluation;
-pub mod geometry;
-pub mod measurement;
-pub mod motion;
-pub mod random;
-pub mod recording;
+pub use zsim_base::{geometry, measurement, random, signal, spec, surfel_map, time};
+pub use zsim_dynamics as dynamics;
+pub use zsim_elasticity as elasticity;
+pub use zsim_estimation as estimation;
+pub use zsim_evaluation as evaluation;
+pub use zsim_motion as motion;
+pub use zsim_recording as recording;
 #[cfg(feature = "studies")]
-pub mod report;
-pub mod sensors;
-pub mod signal;
-pub mod simulation;
-pub mod spec;
+pub use zsim_report as report;
+pub use zsim_sensors as sensors;
+pub use zsim_simulation as simulation;
 #[cfg(feature = "studies")]
-pub mod study;
-pub mod surfel_map;
-pub mod time;
-pub mod truth;
-pub mod world;
+pub use zsim_study as study;
+pub use zsim_truth as truth;
+pub use zsim_world as world;

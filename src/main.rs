@@ -1,7 +1,5 @@
 //! The command `zsim`.
 
-mod cli;
-
 fn main() -> std::process::ExitCode {
-    cli::run()
+    zsim_cli::run()
 }

@@ -1,7 +1,7 @@
-//! Checks the dependencies between the modules of `src/`.
+//! Checks what the compiler does not: the table of rooms, crates that are restricted to some rooms, circles of files, and
+//! names that no room may use.
 //!
-//! Fails on a module that the tables do not list, on a dependency that they do not allow, and on a crate that is used
-//! outside the modules it is restricted to.
+//! A room is a crate, a folder of `src/`. Its manifest lists the rooms that it may use, and the compiler refuses others.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -10,29 +10,47 @@ mod imports;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Base modules, in order: each may use the modules before it.
-const BASE: [&str; 9] =
-    ["time", "random", "geometry", "signal", "spec", "elasticity", "surfel_map", "measurement", "truth"];
+/// Modules of the room `base`, in order: each may use the modules before it.
+const BASE: [&str; 7] = ["time", "random", "geometry", "signal", "spec", "surfel_map", "measurement"];
 
-/// Every other module, with the modules that it may use in addition to the base modules.
-const UPPER: [(&str, &[&str]); 11] = [
-    ("recording", &[]),
-    ("world", &[]),
-    ("motion", &["recording"]),
-    ("dynamics", &["motion"]),
-    ("sensors", &["world"]),
-    ("simulation", &["world", "motion", "dynamics", "sensors"]),
-    ("estimation", &[]),
-    ("evaluation", &["estimation"]),
-    ("report", &["simulation", "estimation", "evaluation"]),
+/// The rooms, in order, each with the rooms that it may use.
+const ROOMS: [(&str, &[&str]); 14] = [
+    // The folders `scenes` and `specs` are crates with files only.
+    ("base", &["scenes", "specs"]),
+    ("truth", &["base"]),
+    ("elasticity", &["base"]),
+    ("recording", &["base", "truth"]),
+    ("world", &["base"]),
+    ("motion", &["base", "recording"]),
+    ("dynamics", &["base", "elasticity", "motion"]),
+    ("sensors", &["base", "world"]),
+    ("simulation", &["base", "truth", "world", "motion", "dynamics", "sensors"]),
+    // Neither ground truth, nor the simulator, nor recordings.
+    ("estimation", &["base"]),
+    ("evaluation", &["base", "estimation"]),
+    ("report", &["base", "simulation", "estimation", "evaluation"]),
     ("study", BELOW_STUDY),
     ("cli", BELOW_CLI),
 ];
 
-const BELOW_STUDY: &[&str] =
-    &["recording", "world", "motion", "dynamics", "sensors", "simulation", "estimation", "evaluation", "report"];
+const BELOW_STUDY: &[&str] = &[
+    "base",
+    "truth",
+    "elasticity",
+    "recording",
+    "world",
+    "motion",
+    "dynamics",
+    "sensors",
+    "simulation",
+    "estimation",
+    "evaluation",
+    "report",
+];
 
 const BELOW_CLI: &[&str] = &[
+    "base",
+    "elasticity",
     "recording",
     "world",
     "motion",
@@ -45,34 +63,31 @@ const BELOW_CLI: &[&str] = &[
     "study",
 ];
 
-/// The only modules that estimation may use: neither ground truth nor data sources.
-const ESTIMATION: [&str; 7] = ["time", "geometry", "measurement", "spec", "signal", "elasticity", "surfel_map"];
-
-/// Crates that are restricted to some modules, and these modules.
+/// Crates that are restricted to some rooms, and these rooms.
 const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
+    ("anyhow", &["cli"]),
     ("base64", &["report"]),
-    ("parry3d", &["world"]),
-    ("rapier3d_f64", &["dynamics"]),
-    ("mcap", &["recording"]),
-    ("las", &["recording"]),
-    ("cdr_encoding", &["recording"]),
-    ("plotters", &["report"]),
-    ("clap", &["cli", "main"]),
+    ("cdr-encoding", &["recording"]),
+    ("clap", &["cli"]),
     ("clap_mangen", &["cli"]),
-    ("anyhow", &["cli", "main"]),
-    ("indicatif", &["cli"]),
-    ("http_body_util", &["cli"]),
-    ("hyper", &["cli"]),
-    ("hyper_util", &["cli"]),
-    ("tokio", &["cli"]),
-    ("include_dir", &["spec"]),
     ("cmaes", &["study"]),
     ("faer", &["estimation", "evaluation"]),
+    ("http-body-util", &["cli"]),
+    ("hyper", &["cli"]),
+    ("hyper-util", &["cli"]),
+    ("include_dir", &["base"]),
+    ("indicatif", &["cli"]),
+    ("las", &["recording"]),
+    ("mcap", &["recording", "cli"]),
     ("parquet", &["study"]),
+    ("parry3d", &["world"]),
+    ("plotters", &["report"]),
+    ("rapier3d-f64", &["dynamics"]),
     ("rustix", &["study"]),
     ("sha2", &["study"]),
-    ("signal_hook", &["cli"]),
+    ("signal-hook", &["cli"]),
     ("sobol", &["study"]),
+    ("tokio", &["cli"]),
 ];
 
 /// Crates of the Python package: the library, and what converts its values.
@@ -107,22 +122,11 @@ fn src() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// The module of a file: the first name below `src/`.
-fn module_of(path: &Path) -> String {
+/// The room of a file: the first name below `src/`.
+fn room_of(path: &Path) -> String {
     let below = path.strip_prefix(src()).unwrap();
     let first = below.components().next().unwrap().as_os_str().to_str().unwrap();
     first.trim_end_matches(".rs").to_owned()
-}
-
-fn allowed_modules(module: &str) -> Option<Vec<&'static str>> {
-    if module == "estimation" {
-        return Some(ESTIMATION.to_vec());
-    }
-    if let Some(position) = BASE.iter().position(|r| *r == module) {
-        return Some(BASE[..position].to_vec());
-    }
-    let (_, more) = UPPER.iter().find(|(name, _)| *name == module)?;
-    Some(BASE.iter().chain(more.iter()).copied().collect())
 }
 
 /// Code without comments, so that comments may use any name.
@@ -130,100 +134,92 @@ fn code(text: &str) -> String {
     text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// The modules that `text` uses, as `crate::module`, `zsim::module`, or within `use crate::{...}`.
-fn modules_used(text: &str) -> Vec<String> {
-    let code = code(text);
-    let mut used = Vec::new();
-    for root in ["crate::", "zsim::"] {
-        for (at, _) in code.match_indices(root) {
-            let rest = &code[at + root.len()..];
-            match rest.strip_prefix('{') {
-                Some(group) => used.extend(first_segments(group)),
-                None => used.push(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()),
-            }
-        }
-    }
-    used.retain(|name: &String| name.starts_with(|c: char| c.is_lowercase()));
-    used
+/// The crates that a manifest names in its tables of dependencies, those of tests included.
+fn dependencies(manifest: &str) -> Vec<String> {
+    let tables = manifest.split("\n[").filter(|table| table.lines().next().is_some_and(|h| h.contains("dependencies")));
+    let entries = tables.flat_map(|table| table.lines().skip(1)).filter(|line| !line.starts_with('#'));
+    let name = |line: &str| line.split(['.', ' ', '=']).next().unwrap_or_default().to_owned();
+    entries.map(name).filter(|name| !name.is_empty()).collect()
 }
 
-/// The first path segment of each entry of a use group; `group` starts after the opening brace.
-fn first_segments(group: &str) -> Vec<String> {
-    let (mut depth, mut entries, mut entry) = (0, Vec::new(), String::new());
-    for c in group.chars() {
-        match c {
-            '{' => depth += 1,
-            '}' if depth == 0 => break,
-            '}' => depth -= 1,
-            ',' if depth == 0 => entries.push(std::mem::take(&mut entry)),
-            _ if depth == 0 => entry.push(c),
-            _ => {}
-        }
-    }
-    entries.push(entry);
-    let first = |e: String| e.trim().split("::").next().unwrap_or_default().trim().to_owned();
-    entries.into_iter().map(first).filter(|e| !e.is_empty()).collect()
+/// The manifests of all rooms.
+fn manifests() -> BTreeMap<String, String> {
+    let folders = std::fs::read_dir(src()).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir());
+    folders.map(|path| (room_of(&path), std::fs::read_to_string(path.join("Cargo.toml")).unwrap())).collect()
 }
 
-/// Violations of the tables, one message each.
-fn violations(files: &BTreeMap<PathBuf, String>) -> Vec<String> {
-    let mut violations = Vec::new();
-    for (path, text) in files {
-        let module = module_of(path);
-        if module == "lib" || module == "main" {
-            continue;
-        }
-        let Some(allowed) = allowed_modules(&module) else {
-            violations.push(format!("{}: module `{module}` is missing in the tables", path.display()));
-            continue;
-        };
-        for used in modules_used(text) {
-            if used != module && !allowed.contains(&used.as_str()) {
-                violations.push(format!("{}: {module} must not use {used}", path.display()));
-            }
-        }
-    }
-    violations
-}
-
-#[test]
-fn modules_use_only_allowed_modules() {
-    let violations = violations(&sources());
-    assert!(violations.is_empty(), "{}", violations.join("\n"));
-}
-
-#[test]
-fn the_check_finds_every_form_of_a_forbidden_use() {
-    let violations_in = |module: &str, text: &str| {
-        let file = src().join(module).join("x.rs");
-        violations(&BTreeMap::from([(file, text.to_owned())])).len()
+/// Violations of the tables by a room with this manifest, one message each.
+fn violations(room: &str, manifest: &str) -> Vec<String> {
+    let Some((_, allowed)) = ROOMS.iter().find(|(name, _)| *name == room) else {
+        return vec![format!("room `{room}` is missing in the table")];
     };
-    assert_eq!(violations_in("estimation", "use crate::truth::TruthSample;"), 1);
-    assert_eq!(violations_in("estimation", "use crate::{time::Stamp, simulation};"), 1);
-    assert_eq!(violations_in("estimation", "fn f() { crate::recording::read(); }"), 1);
-    assert_eq!(violations_in("estimation", "use crate::{geometry::{Pose, Vector}, time::Stamp}; // crate::truth"), 0);
-    assert_eq!(violations_in("geometry", "use crate::measurement::ImuSample;"), 1);
-    assert_eq!(violations_in("nowhere", ""), 1);
+    let used = dependencies(manifest);
+    let rooms = used.iter().filter_map(|name| name.strip_prefix("zsim-")).filter(|used| !allowed.contains(used));
+    let mut found: Vec<String> = rooms.map(|used| format!("{room} must not use {used}")).collect();
+    for (name, rooms) in RESTRICTED_CRATES {
+        if used.iter().any(|used| used == name) && !rooms.contains(&room) {
+            found.push(format!("{name} is restricted to {rooms:?}, and {room} uses it"));
+        }
+    }
+    found
 }
 
 #[test]
-fn restricted_crates_are_used_only_in_their_modules() {
-    for (path, text) in sources() {
-        let (module, code) = (module_of(&path), code(&text));
-        for (name, modules) in RESTRICTED_CRATES {
-            let used = code.contains(&format!("{name}::")) || code.contains(&format!("use {name}"));
-            assert!(
-                !used || modules.contains(&module.as_str()),
-                "{}: {name} is restricted to {modules:?}",
-                path.display()
-            );
+fn rooms_depend_only_on_allowed_rooms_and_crates() {
+    let manifests = manifests();
+    let found: Vec<String> = manifests.iter().flat_map(|(room, manifest)| violations(room, manifest)).collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    assert_eq!(manifests.len(), ROOMS.len(), "a room of the table is missing");
+}
+
+#[test]
+fn the_check_finds_a_forbidden_room_also_among_the_dependencies_of_tests() {
+    let count = |room: &str, manifest: &str| violations(room, manifest).len();
+    assert_eq!(count("estimation", "[package]\n\n[dependencies]\nzsim-base.workspace = true\n"), 0);
+    assert_eq!(count("estimation", "[package]\n\n[dependencies]\nzsim-truth.workspace = true\n"), 1);
+    assert_eq!(count("estimation", "[package]\n\n[dev-dependencies]\nzsim-simulation = { workspace = true }\n"), 1);
+    assert_eq!(count("sensors", "[package]\n\n[target.'cfg(unix)'.dependencies]\nparry3d.workspace = true\n"), 1);
+    assert_eq!(count("nowhere", "[package]\n"), 1);
+}
+
+/// The modules of `base` that `text` uses, as `ROOT::module`.
+fn base_modules_used(text: &str, root: &str) -> Vec<String> {
+    let code = code(text);
+    let names = code.match_indices(root).map(|(at, _)| {
+        code[at + root.len()..].chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>()
+    });
+    names.filter(|name| BASE.contains(&name.as_str())).collect()
+}
+
+#[test]
+fn modules_of_base_use_only_modules_before_them() {
+    for (path, text) in sources().iter().filter(|(path, _)| room_of(path) == "base") {
+        let below = path.strip_prefix(src().join("base")).unwrap();
+        let module =
+            below.components().next().unwrap().as_os_str().to_str().unwrap().trim_end_matches(".rs").to_owned();
+        if module == "lib" {
+            continue;
+        }
+        let place = |name: &str| BASE.iter().position(|other| *other == name);
+        let own = place(&module).unwrap_or_else(|| panic!("{}: `{module}` is missing in the table", path.display()));
+        for used in base_modules_used(text, "crate::") {
+            assert!(place(&used) <= Some(own), "{}: {module} must not use {used}", path.display());
         }
     }
+}
+
+#[test]
+fn the_estimator_uses_no_random_stream_of_the_run() {
+    for (path, text) in sources().iter().filter(|(path, _)| room_of(path) == "estimation") {
+        let used = base_modules_used(text, "zsim_base::");
+        assert!(!used.contains(&"random".to_owned()), "{}: uses the streams of the simulator", path.display());
+    }
+    assert_eq!(base_modules_used("use zsim_base::random::Stream; // zsim_base::time", "zsim_base::"), ["random"]);
 }
 
 #[test]
 fn estimation_uses_no_files() {
-    for (path, text) in sources().iter().filter(|(path, _)| module_of(path) == "estimation") {
+    for (path, text) in sources().iter().filter(|(path, _)| room_of(path) == "estimation") {
         let code = code(text);
         assert!(!code.contains("std::fs") && !code.contains("std::io"), "{}: uses files", path.display());
     }
@@ -231,7 +227,7 @@ fn estimation_uses_no_files() {
 
 #[test]
 fn the_library_uses_no_wall_clock_no_hash_order_and_no_sockets() {
-    for (path, text) in sources().iter().filter(|(path, _)| !["cli", "main"].contains(&module_of(path).as_str())) {
+    for (path, text) in sources().iter().filter(|(path, _)| !["cli", "main"].contains(&room_of(path).as_str())) {
         let code = code(text);
         for word in FORBIDDEN_IN_LIBRARY {
             assert!(!code.contains(word), "{}: uses {word}", path.display());
@@ -245,9 +241,16 @@ fn circles(files: &BTreeMap<String, String>) -> Vec<Vec<String>> {
 
 #[test]
 fn files_do_not_import_each_other_in_a_circle() {
-    let relative = |path: PathBuf| path.strip_prefix(src()).unwrap().to_str().unwrap().to_owned();
-    let found = circles(&sources().into_iter().map(|(path, text)| (relative(path), text)).collect());
-    let found: Vec<String> = found.iter().map(|circle| circle.join(", ")).collect();
+    let mut rooms: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();
+    for (path, text) in sources() {
+        let room = room_of(&path);
+        let file = path.strip_prefix(src().join(&room)).unwrap_or(&path).to_str().unwrap().to_owned();
+        rooms.entry(room).or_default().insert(file, text);
+    }
+    let of_room = |(room, files): (&String, &BTreeMap<String, String>)| -> Vec<String> {
+        circles(files).iter().map(|circle| format!("{room}: {}", circle.join(", "))).collect()
+    };
+    let found: Vec<String> = rooms.iter().flat_map(of_room).collect();
     assert!(
         found.is_empty(),
         "files that import each other; move what they share to a file of its own:\n{}",
@@ -344,16 +347,22 @@ fn the_program_for_ros_2_passes_messages_and_does_not_use_the_library() {
 }
 
 #[test]
-fn the_package_has_every_source() {
+fn the_packages_have_every_source() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut cargo = std::process::Command::new(env!("CARGO"));
-    let list = cargo.current_dir(root).args(["package", "--list", "--allow-dirty", "--offline", "-p", "zsim"]);
-    let output = list.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let packaged = String::from_utf8(output.stdout).unwrap();
-    let packaged: Vec<&str> = packaged.lines().collect();
-    for path in sources().keys() {
-        let name = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
-        assert!(packaged.contains(&name.as_str()), "{name} is not in the package");
+    for (folder, files) in sources().keys().fold(BTreeMap::<PathBuf, Vec<String>>::new(), |mut packages, path| {
+        let room = src().join(room_of(path));
+        let package = if room.is_dir() { room } else { root.to_owned() };
+        let file = path.strip_prefix(&package).unwrap().to_str().unwrap().replace('\\', "/");
+        packages.entry(package).or_default().push(file);
+        packages
+    }) {
+        let mut cargo = std::process::Command::new(env!("CARGO"));
+        let list = cargo.current_dir(&folder).args(["package", "--list", "--allow-dirty", "--offline"]);
+        let output = list.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let packaged = String::from_utf8(output.stdout).unwrap();
+        let packaged: Vec<&str> = packaged.lines().collect();
+        let missing: Vec<&String> = files.iter().filter(|file| !packaged.contains(&file.as_str())).collect();
+        assert!(missing.is_empty(), "{}: not in the package: {missing:?}", folder.display());
     }
 }

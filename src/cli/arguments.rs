@@ -5,13 +5,12 @@ use super::usage::Usage;
 use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use zsim::estimation::{self, EstimatorSpec};
-use zsim::geometry::{Pose, Rotation, Route, Vector};
-use zsim::motion;
-use zsim::random::Seed;
-use zsim::simulation::Scenario;
-use zsim::spec::{Kind, find};
-use zsim::study::{CalibrationSpec, CloudFormat, CloudOptions, EstimateOptions};
+use zsim_base::geometry::{Pose, Rotation, Route, Vector};
+use zsim_base::random::Seed;
+use zsim_base::spec::{Kind, find};
+use zsim_estimation::{self, EstimatorSpec};
+use zsim_simulation::Scenario;
+use zsim_study::{CalibrationSpec, CloudFormat, CloudOptions, EstimateOptions};
 
 /// Arguments that every command accepts.
 #[derive(Args)]
@@ -108,7 +107,7 @@ impl ScenarioArguments {
         ];
         let sources = names.into_iter().filter_map(|(kind, name)| find(kind, name).ok());
         let files = sources.filter(|source| source.folder.is_some()).map(|source| PathBuf::from(source.name));
-        let recorded = motion::load(&scenario.motion).ok().and_then(|(spec, source)| spec.recorded_file(&source));
+        let recorded = zsim_motion::load(&scenario.motion).ok().and_then(|(spec, source)| spec.recorded_file(&source));
         files.chain(recorded).collect()
     }
 }
@@ -126,7 +125,7 @@ pub(super) struct EstimatorSettings {
 
 impl EstimatorSettings {
     pub(super) fn spec(&self) -> anyhow::Result<EstimatorSpec> {
-        let mut estimator = estimation::load(&self.estimator)?;
+        let mut estimator = zsim_estimation::load(&self.estimator)?;
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
         estimator.check().map_err(|error| Usage(error.to_string()))?;
         Ok(estimator)

@@ -6,7 +6,7 @@ pub(super) use super::signals::{end_polling, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use zsim::study::{Stage, StudyEvent};
+use zsim_study::{Stage, StudyEvent};
 
 /// Number of steps of a bar.
 const STEPS: u64 = 1000;

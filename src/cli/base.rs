@@ -6,13 +6,11 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::dynamics::{self, HeadModel};
-use zsim::estimation::BaseEstimate;
-use zsim::evaluation::{Errors, Pairs};
-use zsim::geometry::{Trajectory, Vector};
-use zsim::recording::{Loss, Reader, Truth, read_tum, write_tum};
-use zsim::report;
-use zsim::study;
+use zsim_base::geometry::{Trajectory, Vector};
+use zsim_dynamics::{self, HeadModel};
+use zsim_estimation::BaseEstimate;
+use zsim_evaluation::{Errors, Pairs};
+use zsim_recording::{Loss, Reader, Truth, read_tum, write_tum};
 
 /// Compute the trajectory of the base (handle, vehicle) from that of the head on its spring
 ///
@@ -68,7 +66,7 @@ impl MethodResult {
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
-    let (head, source) = dynamics::load(&arguments.head)?;
+    let (head, source) = zsim_dynamics::load(&arguments.head)?;
     let head = HeadModel::new(&head, &source)?;
     let head_trajectory = read_tum(&arguments.trajectory)?;
     anyhow::ensure!(
@@ -79,7 +77,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     );
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
     let by_spring = match &arguments.base_imu {
-        Some(_) => study::base_by_law(&head, &head_trajectory)?,
+        Some(_) => zsim_study::base_by_law(&head, &head_trajectory)?,
         None => head.base_from_force_law(&head_trajectory)?,
     };
     let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &head_trajectory));
@@ -123,7 +121,7 @@ fn by_imu(
     let reader = Reader::open(recording)?;
     let record = reader.base_imu(arguments.base_imu_topic.as_deref())?;
     let offset_s = arguments.clock_offset_ms.map(|ms| ms * 1e-3);
-    let estimate = study::base_by_imu(head, head_trajectory, &reader, &record, offset_s);
+    let estimate = zsim_study::base_by_imu(head, head_trajectory, &reader, &record, offset_s);
     Ok((estimate.with_context(|| recording.display().to_string())?, record.loss))
 }
 
@@ -149,7 +147,7 @@ fn write_results(
         rows.push(vec![(*name).to_owned(), base.len().to_string(), position, rotation]);
     }
     let heading = ["method", "poses", "position RMSE (mm)", "rotation RMSE (\u{b0})"];
-    Ok((report::table(&heading, &rows, true), figures))
+    Ok((zsim_report::table(&heading, &rows, true), figures))
 }
 
 /// Errors after rigid alignment.

@@ -7,11 +7,10 @@ use super::{Completion, output};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::evaluation::MapKnowledge;
-use zsim::recording::Reader;
-use zsim::report;
-use zsim::study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
-use zsim::world::World;
+use zsim_evaluation::MapKnowledge;
+use zsim_recording::Reader;
+use zsim_study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
+use zsim_world::World;
 
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed
 ///
@@ -91,7 +90,7 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
 fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, force)?;
     replace_text(&folder.join("bound.csv"), &csv(bounded))?;
-    report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
+    zsim_report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
     Ok(folder)
 }
 
@@ -133,7 +132,7 @@ fn text(bounded: &RecordingBound) -> String {
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     let divided = bound.unknown_map.as_ref().is_some_and(|map| map.joint_beam_fraction < 1.0);
     let caveat = if divided { CAVEAT } else { "" };
-    format!("No unbiased estimate can be better than:\n{}{caveat}", report::table(&[], &rows, false))
+    format!("No unbiased estimate can be better than:\n{}{caveat}", zsim_report::table(&[], &rows, false))
 }
 
 fn figures(bounded: &RecordingBound, scene: &str) -> Value {

@@ -5,19 +5,19 @@ use super::{Completion, output, usage};
 use clap::Args;
 use serde_json::json;
 use std::path::Path;
-use zsim::dynamics::{HeadModel, HeadSpec};
-use zsim::elasticity::{ElasticityError, SpringSpec};
-use zsim::estimation::{EstimationError, EstimatorSpec};
-use zsim::motion::MotionSpec;
-use zsim::random::Seed;
-use zsim::sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
-use zsim::simulation::{EPOCH, Faults, FaultsSpec};
-use zsim::spec::{Kind, Source, SpecError, find, parse};
-use zsim::study::StudyError;
-use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::spring::design::{DesignSearch, DesignSpec};
-use zsim::study::sweep::{Plan, SweepSpec};
-use zsim::world::{SceneSpec, World, WorldError};
+use zsim_base::random::Seed;
+use zsim_base::spec::{Kind, Source, SpecError, find, parse};
+use zsim_dynamics::{HeadModel, HeadSpec};
+use zsim_elasticity::{ElasticityError, SpringSpec};
+use zsim_estimation::{EstimationError, EstimatorSpec};
+use zsim_motion::MotionSpec;
+use zsim_sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
+use zsim_simulation::{EPOCH, Faults, FaultsSpec};
+use zsim_study::StudyError;
+use zsim_study::reproduction::ExperimentSpec;
+use zsim_study::spring::design::{DesignSearch, DesignSpec};
+use zsim_study::sweep::{Plan, SweepSpec};
+use zsim_world::{SceneSpec, World, WorldError};
 
 /// The kinds that there is a check for.
 const KINDS: [Kind; 11] = [
@@ -168,12 +168,12 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
         },
         Kind::Head => match HeadModel::new(&HeadSpec::read(source)?, source) {
             Ok(_) => Ok(()),
-            Err(zsim::dynamics::DynamicsError::Spec(error)) => Err(error),
+            Err(zsim_dynamics::DynamicsError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
         Kind::Motion => match parse::<MotionSpec>(source)?.build(source, Some(&any_route()), 120.0, Seed(1)) {
             Ok(_) => Ok(()),
-            Err(zsim::motion::MotionError::Spec(error)) => Err(error),
+            Err(zsim_motion::MotionError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
         Kind::Lidar => Lidar::new(&parse::<LidarSpec>(source)?, source).map(drop),

@@ -7,10 +7,9 @@ use anyhow::{Context, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::evaluation::{Errors, Pairs, TrajectoryErrors};
-use zsim::geometry::Trajectory;
-use zsim::report;
-use zsim::study::replace_text;
+use zsim_base::geometry::Trajectory;
+use zsim_evaluation::{Errors, Pairs, TrajectoryErrors};
+use zsim_study::replace_text;
 
 /// Coverage below which a limit of the errors says little, for a note.
 const LOW_COVERAGE: f64 = 0.95;
@@ -115,7 +114,7 @@ fn label(compared: &mut [Compared]) {
 fn violations(arguments: &Arguments, compared: &[Compared]) -> Vec<String> {
     let mut violations = Vec::new();
     for each in compared {
-        let figures = report::trajectory_figures(&each.errors);
+        let figures = zsim_report::trajectory_figures(&each.errors);
         violations.extend(arguments.fail_above.iter().filter_map(|limit| limit.violation(&each.name, &figures)));
         if let Some(needed) = arguments.min_coverage.filter(|needed| each.errors.coverage < *needed) {
             let (name, covered) = (&each.name, 100.0 * each.errors.coverage);
@@ -127,7 +126,7 @@ fn violations(arguments: &Arguments, compared: &[Compared]) -> Vec<String> {
 
 fn figures(arguments: &Arguments, compared: &[Compared], violations: &[String]) -> Value {
     let trajectory = |each: &Compared| {
-        let mut figures = report::trajectory_figures(&each.errors);
+        let mut figures = zsim_report::trajectory_figures(&each.errors);
         figures.shift_insert(0, "file".to_owned(), json!(each.name));
         Value::Object(figures)
     };
@@ -141,16 +140,16 @@ fn figures(arguments: &Arguments, compared: &[Compared], violations: &[String]) 
 
 fn text(compared: &[Compared], is_verbose: bool) -> String {
     let named: Vec<(&str, &TrajectoryErrors)> = compared.iter().map(|each| (&*each.label, &each.errors)).collect();
-    let details = if is_verbose { format!("\n{}", report::comparison_details(&named)) } else { String::new() };
-    report::comparison_table(&named) + &details
+    let details = if is_verbose { format!("\n{}", zsim_report::comparison_details(&named)) } else { String::new() };
+    zsim_report::comparison_table(&named) + &details
 }
 
 /// Writes the figures and plots into `folder`.
 fn write(folder: &Path, truth: &Trajectory, compared: &[Compared], figures: &Value) -> anyhow::Result<()> {
     let errors: Vec<(&str, &Errors)> = compared.iter().map(|each| (&*each.label, &each.over_time)).collect();
-    report::compared_errors(&errors).save(folder, "errors")?;
+    zsim_report::compared_errors(&errors).save(folder, "errors")?;
     let paths: Vec<(&str, &Trajectory)> = compared.iter().map(|each| (&*each.label, &each.aligned)).collect();
-    report::compared_trajectories(truth, &paths).save(folder, "trajectories")?;
+    zsim_report::compared_trajectories(truth, &paths).save(folder, "trajectories")?;
     replace_text(&folder.join("comparison.json"), &(serde_json::to_string_pretty(figures)? + "\n"))?;
     Ok(())
 }

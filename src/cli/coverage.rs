@@ -5,14 +5,12 @@ use super::bars::WorkBar;
 use super::{Completion, coverage_text, output, quantity};
 use clap::Args;
 use std::path::Path;
-use zsim::dynamics::{self, ContactWatch, HeadModel, HeadState};
-use zsim::motion;
-use zsim::random::Seed;
-use zsim::report;
-use zsim::sensors::{Imu, Lidar};
-use zsim::spec::{Kind, find, parse};
-use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
-use zsim::study::replace_text;
+use zsim_base::random::Seed;
+use zsim_base::spec::{Kind, find, parse};
+use zsim_dynamics::{self, ContactWatch, HeadModel, HeadState};
+use zsim_sensors::{Imu, Lidar};
+use zsim_study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
+use zsim_study::replace_text;
 
 /// Compute the coverage of the sphere by a lidar on a moving head: fraction, density and time, and the required gyroscope
 /// range
@@ -48,13 +46,13 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
-    let (head, head_source) = dynamics::load(&arguments.head)?;
+    let (head, head_source) = zsim_dynamics::load(&arguments.head)?;
     let head = HeadModel::new(&head, &head_source)?;
     let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
     let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
     let imu_source = find(Kind::Imu, &arguments.imu)?;
     let imu = Imu::new(&parse(&imu_source)?, &imu_source)?;
-    let (motion, motion_source) = motion::load(&arguments.motion)?;
+    let (motion, motion_source) = zsim_motion::load(&arguments.motion)?;
     let until_s = arguments.from + arguments.duration;
     let motion = motion.build(&motion_source, Some(&any_route()), until_s, Seed(arguments.seed))?;
     let plan = CoveragePlan {
@@ -102,5 +100,5 @@ fn text(seen: &Coverage) -> String {
         ("99th percentile of the rate, deg/s", format!("{:.0}", gyro.p99_deg_per_s)),
     ]);
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
-    report::table(&[], &rows, false)
+    zsim_report::table(&[], &rows, false)
 }

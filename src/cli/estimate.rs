@@ -7,10 +7,10 @@ use super::live::LiveArguments;
 use super::{full_run, output};
 use clap::Args;
 use std::path::PathBuf;
-use zsim::geometry::Pose;
-use zsim::recording::{Reader, TopicPreference};
-use zsim::report::page::LivePage;
-use zsim::study::{self, EstimateOptions, MapOptions, ProgressMonitor, StudyEvent};
+use zsim_base::geometry::Pose;
+use zsim_recording::{Reader, TopicPreference};
+use zsim_report::page::LivePage;
+use zsim_study::{self, EstimateOptions, MapOptions, ProgressMonitor, StudyEvent};
 
 /// Estimate trajectory and map from a recording of any program
 ///
@@ -82,7 +82,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let wanted = arguments.out.out.clone().unwrap_or_else(|| full_run::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
     let inputs = [Some(&arguments.recording), arguments.map.as_ref(), arguments.calibration.as_ref()];
-    let written: Vec<PathBuf> = study::estimate_files().iter().map(|name| folder.join(name)).collect();
+    let written: Vec<PathBuf> = zsim_study::estimate_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
 
     let mut bars = Bars::new(global);
@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         bars.update(event);
     };
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = study::estimate_recording(&reader, &selection, &folder, &options, &mut watch);
+    let outcome = zsim_study::estimate_recording(&reader, &selection, &folder, &options, &mut watch);
     bars.finish();
     live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| full_run::print_partial_results(&folder))?;

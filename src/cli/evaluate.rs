@@ -6,11 +6,10 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
-use zsim::evaluation::{CloudErrors, Pairs, Thinning, TrajectoryErrors};
-use zsim::geometry::{Pose, SmoothCursor, Trajectory, Vector};
-use zsim::recording::PlyReader;
-use zsim::report;
-use zsim::world::World;
+use zsim_base::geometry::{Pose, SmoothCursor, Trajectory, Vector};
+use zsim_evaluation::{CloudErrors, Pairs, Thinning, TrajectoryErrors};
+use zsim_recording::PlyReader;
+use zsim_world::World;
 
 /// Maximum number of points of a cloud that are evaluated.
 const MAX_EVALUATED_POINTS: usize = 200_000;
@@ -52,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         let known = trajectory_file::truth(truth)?;
         let pairs = Pairs::associate(&estimate, &known)?;
         let (errors, _) = TrajectoryErrors::of(&pairs, &known)?;
-        metrics = report::trajectory_figures(&errors);
+        metrics = zsim_report::trajectory_figures(&errors);
         estimated = Some((estimate, pairs.world_from_map()?));
     }
     if let (Some(cloud), Some(scene)) = (&arguments.cloud, &arguments.scene) {
@@ -101,5 +100,5 @@ fn text(metrics: &Map<String, Value>) -> String {
         _ => value.to_string(),
     };
     let rows: Vec<Vec<String>> = known.map(|(key, metric)| vec![key.clone(), value(metric)]).collect();
-    report::table(&[], &rows, true)
+    zsim_report::table(&[], &rows, true)
 }

@@ -5,11 +5,11 @@ use super::signals;
 use super::usage::Usage;
 use std::error::Error;
 use std::process::ExitCode;
-use zsim::motion::MotionError;
-use zsim::simulation::SimulationError;
-use zsim::spec::SpecError;
-use zsim::study::StudyError;
-use zsim::world::WorldError;
+use zsim_base::spec::SpecError;
+use zsim_motion::MotionError;
+use zsim_simulation::SimulationError;
+use zsim_study::StudyError;
+use zsim_world::WorldError;
 
 /// Prints the error with its causes and returns the exit code: that of the signal that stopped the run, 2 for invalid
 /// usage or input, else 1.

@@ -8,9 +8,9 @@ use super::{output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::report::{self, Metrics};
-use zsim::simulation::{Outputs, Simulation};
-use zsim::study::{self, EstimateResult, ProgressMonitor, StudyEvent};
+use zsim_report::{self, Metrics};
+use zsim_simulation::{Outputs, Simulation};
+use zsim_study::{self, EstimateResult, ProgressMonitor, StudyEvent};
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -32,11 +32,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let options = arguments.estimator.options()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
-    let mut live = arguments.live.start(|| study::live_page(&simulation))?;
+    let mut live = arguments.live.start(|| zsim_study::live_page(&simulation))?;
     let mut bars = Bars::new(global);
     recording_size::check(&simulation, Outputs::All, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let written: Vec<PathBuf> = study::full_run_files().iter().map(|name| folder.join(name)).collect();
+    let written: Vec<PathBuf> = zsim_study::full_run_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;
     note_other_folder(&folder, &wanted, &bars);
 
@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         bars.update(event);
     };
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = study::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
+    let outcome = zsim_study::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
     bars.finish();
     live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
@@ -90,10 +90,11 @@ pub(super) fn print_outcome(
     if let (true, Value::Object(object)) = (profile, &mut figures) {
         object.insert("profile".to_owned(), seconds_by_part(outcome));
     }
-    let mut words = if global.verbose { report::summary(&outcome.metrics) } else { report::brief(&outcome.metrics) };
+    let mut words =
+        if global.verbose { zsim_report::summary(&outcome.metrics) } else { zsim_report::brief(&outcome.metrics) };
     if let (true, Some(wall_s)) = (profile, outcome.metrics.open_loop.wall_s) {
         words += "\n";
-        words += &report::timing_table(&outcome.timing, wall_s);
+        words += &zsim_report::timing_table(&outcome.timing, wall_s);
     }
     output::print_result(global, &words, figures, Some(folder))?;
     let Metrics { losses, status, .. } = &outcome.metrics;

@@ -8,15 +8,14 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
-use zsim::motion::Axis;
-use zsim::random::Seed;
-use zsim::report;
-use zsim::study::gains::{
+use zsim_base::random::Seed;
+use zsim_dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
+use zsim_motion::Axis;
+use zsim_study::gains::{
     AXES, GainCurve, GainPlan, GainWatch, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure,
     min_coherence, page, peak_table, swing_csv, swing_figure, swing_study, with_damping,
 };
-use zsim::study::replace_text;
+use zsim_study::replace_text;
 
 /// Measure a head's gain curves: head motion over base motion by frequency, from simulation and in closed form
 ///
@@ -154,7 +153,7 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
     let slowest_hz = head.linear_modes().first().map_or(plan.up_to_hz, |mode| mode.frequency_hz);
     let plan = GainPlan { up_to_hz: plan.up_to_hz.min(3.0 * slowest_hz), ..plan.clone() };
     let study = |(before, axis): (usize, &Axis)| {
-        bar.set_task(format!("swinging, {}", report::quantity_name(axis_name(*axis))));
+        bar.set_task(format!("swinging, {}", zsim_report::quantity_name(axis_name(*axis))));
         let on_progress = |fraction: f64| bar.set_fraction((before as f64 + fraction) / axes.len() as f64);
         Ok(swing_study(head, *axis, degrees, &plan, GainWatch { on_progress: &on_progress, ..GainWatch::silent() })?)
     };
@@ -164,12 +163,12 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
 fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
     let dash = || "-".to_owned();
     let (header, rows) = peak_table(curves);
-    let mut words = report::table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows, true);
+    let mut words = zsim_report::table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows, true);
     for study in swings {
-        let row = |p: &zsim::study::gains::SwingPoint| {
+        let row = |p: &zsim_study::gains::SwingPoint| {
             let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
             vec![
-                format!("{}, {:.1} deg", report::quantity_name(axis_name(study.axis)), p.swing_rms_deg),
+                format!("{}, {:.1} deg", zsim_report::quantity_name(axis_name(study.axis)), p.swing_rms_deg),
                 format!("{:.1}", p.swing_most_deg),
                 number(p.peak.map(|peak| peak.freq_hz), 3),
                 number(p.peak.map(|peak| peak.gain), 2),
@@ -178,15 +177,16 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
         };
         let header = ["swing RMS", "max deg", "peak Hz", "gain", "coherence"];
         words += "\n";
-        words += &report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
-        words += &study.ended.as_ref().map(|why| report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
+        words += &zsim_report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
+        words +=
+            &study.ended.as_ref().map(|why| zsim_report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
     }
     let contacts = curves.iter().map(|curve| (curve.axis, curve.coil_contact));
     let in_swings = swings.iter().flat_map(|study| study.points.iter().map(|p| (study.axis, p.coil_contact)));
     for (axis, contact) in contacts.chain(in_swings) {
         if let Some(contact) = contact {
-            let warning = format!("{}: {}", report::quantity_name(axis_name(axis)), contact.warning());
-            words += &report::wrapped(&warning, "  ");
+            let warning = format!("{}: {}", zsim_report::quantity_name(axis_name(axis)), contact.warning());
+            words += &zsim_report::wrapped(&warning, "  ");
         }
     }
     words

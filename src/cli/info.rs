@@ -5,9 +5,8 @@ use super::output::printable_name;
 use super::{Completion, output, quantity};
 use clap::Args;
 use std::path::PathBuf;
-use zsim::recording::{Reader, RecordingInfo, TopicInfo};
-use zsim::report;
-use zsim::time::Span;
+use zsim_base::time::Span;
+use zsim_recording::{Reader, RecordingInfo, TopicInfo};
 
 /// Summarise a recording: topics, rates, gaps, clocks, and losses
 #[derive(Args)]
@@ -37,15 +36,18 @@ fn text(info: &RecordingInfo) -> String {
     let maker = if info.has_manifest { ", made by zsim" } else { "" };
     let head =
         format!("{}: {:.3} s, {} messages, {mebibytes:.1} MiB{maker}", info.name, info.duration_s, info.messages);
-    let topics = report::table(
+    let topics = zsim_report::table(
         &["topic", "type", "count", "Hz", "max s", "gaps", "lost", "late"],
         &info.topics.iter().map(topic_row).collect::<Vec<_>>(),
         true,
     );
     let clocks: Vec<_> = info.topics.iter().filter_map(clock_row).collect();
-    let clocks =
-        report::table(&["stamps against log time", "offset ms", "drift ppm", "jitter ms", "pattern"], &clocks, true);
-    format!("{}\n{topics}\n{clocks}", report::wrapped(&head, "  "))
+    let clocks = zsim_report::table(
+        &["stamps against log time", "offset ms", "drift ppm", "jitter ms", "pattern"],
+        &clocks,
+        true,
+    );
+    format!("{}\n{topics}\n{clocks}", zsim_report::wrapped(&head, "  "))
 }
 
 fn topic_row(topic: &TopicInfo) -> Vec<String> {

@@ -5,10 +5,10 @@ use super::{Completion, output, sweep};
 use anyhow::anyhow;
 use clap::Args;
 use std::path::PathBuf;
-use zsim::random::Seed;
-use zsim::spec::{Kind, find, parse};
-use zsim::study::latency::text_table;
-use zsim::study::sweep::{Plan, Shard, SweepSpec};
+use zsim_base::random::Seed;
+use zsim_base::spec::{Kind, find, parse};
+use zsim_study::latency::text_table;
+use zsim_study::sweep::{Plan, Shard, SweepSpec};
 
 /// The study with the latencies and noises.
 const STUDY: &str = "timing";

@@ -7,7 +7,7 @@ use clap::{Args, Command};
 use clap_mangen::Man;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use zsim::study::replace_text;
+use zsim_study::replace_text;
 
 /// Write the manual pages of all commands: zsim.1, zsim-simulate.1, zsim-sweep-plan.1, ...
 ///
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn every_command_of_the_help_has_a_page_and_no_other() {
-        let command = crate::cli::Cli::command();
+        let command = crate::Cli::command();
         let mut expected = BTreeSet::new();
         listed(&command, "zsim", &mut expected);
         let pages = pages(command).unwrap();

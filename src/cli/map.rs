@@ -5,10 +5,7 @@ use super::{Completion, output};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
-use zsim::estimation;
-use zsim::geometry::{Pose, roll_pitch_yaw};
-use zsim::report;
-use zsim::study;
+use zsim_base::geometry::{Pose, roll_pitch_yaw};
 
 /// Put maps together
 ///
@@ -54,9 +51,9 @@ struct MergeArguments {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let Command::Merge(merge) = &arguments.command;
-    let estimator = estimation::load(&merge.estimator)?;
+    let estimator = zsim_estimation::load(&merge.estimator)?;
     let out = output::file(&merge.out, merge.force)?;
-    let merged = study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, &out)?;
+    let merged = zsim_study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, &out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
     let (position, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());
@@ -79,6 +76,6 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         "share_on_first": fraction,
         "residual_rms_m": residual_m,
     });
-    output::print_result(global, &report::table(&[], &rows, true), figures, Some(&out))?;
+    output::print_result(global, &zsim_report::table(&[], &rows, true), figures, Some(&out))?;
     Ok(Completion::Done)
 }

@@ -6,7 +6,7 @@ use anyhow::{Context, bail, ensure};
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use zsim::recording::other_format;
+use zsim_recording::other_format;
 
 /// A file next to a recording, with the same name and another ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,9 +6,8 @@ use super::{Completion, full_run, output};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
-use zsim::report;
-use zsim::study::sweep::{Measure, RepeatedRun, Shard, Sweep};
-use zsim::study::{ProgressMonitor, StudyError};
+use zsim_study::sweep::{Measure, RepeatedRun, Shard, Sweep};
+use zsim_study::{ProgressMonitor, StudyError};
 
 /// Repeat one run of a sweep with all its files: recording, trajectories, metrics, report.html
 ///
@@ -54,9 +53,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 
 fn text(measures: &[(Measure, Option<f64>)]) -> String {
     let row = |(measure, value): &(Measure, Option<f64>)| {
-        vec![report::quantity_name(measure.key()), value.map_or("-".to_owned(), |value| format!("{value:.6}"))]
+        vec![zsim_report::quantity_name(measure.key()), value.map_or("-".to_owned(), |value| format!("{value:.6}"))]
     };
-    report::table(&[], &measures.iter().map(row).collect::<Vec<_>>(), true)
+    zsim_report::table(&[], &measures.iter().map(row).collect::<Vec<_>>(), true)
 }
 
 fn figures(measures: &[(Measure, Option<f64>)]) -> Map<String, Value> {

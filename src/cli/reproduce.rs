@@ -8,10 +8,9 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use zsim::report;
-use zsim::study::replace_text;
-use zsim::study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_page, paper_table};
-use zsim::study::sweep::Runner;
+use zsim_study::replace_text;
+use zsim_study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_page, paper_table};
+use zsim_study::sweep::Runner;
 
 /// Repeat the paper's experiments: compare the published results with zsim's
 ///
@@ -70,7 +69,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         .flat_map(|result| &result.rows)
         .map(|row| vec![format!("{} {}", row.figure, row.what), row.paper.clone(), row.ours.clone()])
         .collect();
-    let words = report::table(&["figure", "the paper", "ours"], &rows, false);
+    let words = zsim_report::table(&["figure", "the paper", "ours"], &rows, false);
     let figures = found.iter().filter_map(|Finding { experiment, result }| {
         let result = result.as_ref()?;
         Some(json!({ "name": experiment.given, "rows": result.rows, "notes": result.notes }))

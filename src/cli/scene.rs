@@ -6,9 +6,9 @@ use super::{Completion, output, quantity};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use zsim::study::scene;
-use zsim::study::{replace_bytes, replace_text};
-use zsim::world::{MeshFormat, World};
+use zsim_study::scene;
+use zsim_study::{replace_bytes, replace_text};
+use zsim_world::{MeshFormat, World};
 
 /// Look at a scene, and export it for other programs
 #[derive(Args)]

@@ -9,10 +9,9 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use zsim::recording::write_rosbag2_metadata;
-use zsim::report;
-use zsim::simulation::{Outputs, Simulation, SimulationSummary};
-use zsim::study::{self, ProgressMonitor, ViewerFiles};
+use zsim_recording::write_rosbag2_metadata;
+use zsim_simulation::{Outputs, Simulation, SimulationSummary};
+use zsim_study::{self, ProgressMonitor, ViewerFiles};
 
 /// Simulate and record: an MCAP file with the truth inside, and next to it the true trajectory and files for viewers
 #[derive(Args)]
@@ -63,8 +62,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     simulation.world().notes().iter().for_each(|note| bars.note(note));
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let recorded = match files.companion(Companion::Truth) {
-        Some(truth) => study::record(&simulation, files.recording(), &truth, arguments.truth_tf, &mut watch),
-        None => study::record_imus(&simulation, files.recording(), &mut watch),
+        Some(truth) => zsim_study::record(&simulation, files.recording(), &truth, arguments.truth_tf, &mut watch),
+        None => zsim_study::record_imus(&simulation, files.recording(), &mut watch),
     };
     bars.finish();
     let summary = recorded.inspect_err(|_| super::full_run::print_partial_results(files.recording()))?;
@@ -121,5 +120,5 @@ fn text(summary: &SimulationSummary, outputs: Outputs) -> String {
     rows.extend(summary.coil_contact.map(|contact| {
         row("coil contact", format!("from {:.2} s, for {:.2} s", contact.first_t_s, contact.contact_s))
     }));
-    report::table(&[], &rows, true)
+    zsim_report::table(&[], &rows, true)
 }

@@ -5,15 +5,15 @@ use super::bars::WorkBar;
 use super::{Completion, output, spring_text};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
-use zsim::dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
-use zsim::elasticity::SpringSpec;
-use zsim::sensors::{Imu, Lidar};
-use zsim::spec::{Kind, Source, SpecError, find, parse};
-use zsim::study::coverage::{CoveragePlan, coverage_figure};
-use zsim::study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
-use zsim::study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
-use zsim::study::sweep::SweepSpec;
-use zsim::study::{replace_bytes, replace_text};
+use zsim_base::spec::{Kind, Source, SpecError, find, parse};
+use zsim_dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
+use zsim_elasticity::SpringSpec;
+use zsim_sensors::{Imu, Lidar};
+use zsim_study::coverage::{CoveragePlan, coverage_figure};
+use zsim_study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
+use zsim_study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
+use zsim_study::sweep::SweepSpec;
+use zsim_study::{replace_bytes, replace_text};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one
@@ -168,10 +168,10 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<Subject> {
     let stem = |path: &str| Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let as_spring =
         find(Kind::Spring, file).and_then(|source| parse::<SpringSpec>(&source).map(|spring| (spring, source)));
-    match (dynamics::load(file), as_spring) {
+    match (zsim_dynamics::load(file), as_spring) {
         (Ok((spec, source)), _) => Ok(Subject { name: stem(file), spec, source }),
         (Err(_), Ok((bare, source))) => {
-            let (mut spec, _) = dynamics::load(head)?;
+            let (mut spec, _) = zsim_dynamics::load(head)?;
             let LinkageSpec::Spring { spring, .. } = &mut spec.linkage else {
                 let message = format!("the head \"{head}\" has no spring to replace; name one that has with --head");
                 return Err(SpecError::plain(head, message).into());

@@ -2,11 +2,11 @@
 
 use super::coverage_text;
 use std::collections::{BTreeMap, BTreeSet};
-use zsim::report::page::PageTable;
-use zsim::report::{digits, table, wrapped};
-use zsim::study::spring::design::{DesignStudy, VerifiedDesign};
-use zsim::study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
-use zsim::study::sweep::Measure;
+use zsim_report::page::PageTable;
+use zsim_report::{digits, table, wrapped};
+use zsim_study::spring::design::{DesignStudy, VerifiedDesign};
+use zsim_study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
+use zsim_study::sweep::Measure;
 
 /// The report on a spring.
 pub(super) fn report(report: &SpringReport) -> String {

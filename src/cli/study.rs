@@ -4,7 +4,7 @@ use super::arguments::Global;
 use super::{Completion, sweep};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use zsim::study::sweep::Shard;
+use zsim_study::sweep::Shard;
 
 /// Vary the parameters of a run and report their effects: `zsim sweep` plan, run and merge in one
 ///

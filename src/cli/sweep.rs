@@ -10,9 +10,9 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use zsim::spec::{Kind, SpecError, find, parse};
-use zsim::study::spring::design::DesignSpec;
-use zsim::study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
+use zsim_base::spec::{Kind, SpecError, find, parse};
+use zsim_study::spring::design::DesignSpec;
+use zsim_study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///

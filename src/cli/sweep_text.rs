@@ -1,7 +1,5 @@
 //! Text output of `zsim sweep`.
-
-use zsim::report;
-use zsim::study::sweep::{Sweep, SweepStatus};
+use zsim_study::sweep::{Sweep, SweepStatus};
 
 /// Summary of a plan.
 pub(super) fn plan_text(sweep: &Sweep) -> String {
@@ -22,7 +20,7 @@ pub(super) fn status_text(status: &SweepStatus) -> String {
     let remaining = status.thread_s_left.filter(|_| status.missing > 0);
     rows.extend(remaining.map(|seconds| ("remaining time, one thread", duration(seconds))));
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
-    report::table(&[], &rows, true)
+    zsim_report::table(&[], &rows, true)
 }
 
 /// A duration in readable units.

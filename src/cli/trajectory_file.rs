@@ -2,8 +2,8 @@
 
 use anyhow::{bail, ensure};
 use std::path::Path;
-use zsim::geometry::Trajectory;
-use zsim::recording::{Reader, read_tum};
+use zsim_base::geometry::Trajectory;
+use zsim_recording::{Reader, read_tum};
 
 /// Maximum coordinate of a position, m; sums of squares of larger values could overflow.
 const MAX_COORDINATE_M: f64 = 1e12;

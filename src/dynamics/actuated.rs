@@ -1,12 +1,12 @@
 //! A head that a motor rotates about an axis: spinning and nodding mounts.
 
 use super::placement::PlacementSpec;
-use crate::geometry::{Kinematics, Pose, Rotation, Vector};
-use crate::spec::checked::{FiniteArray, NonNegative, Positive};
-use crate::spec::{Source, SpecError};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector};
+use zsim_base::spec::checked::{FiniteArray, NonNegative, Positive};
+use zsim_base::spec::{Source, SpecError};
 
 /// A motor between base and head.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]

@@ -6,9 +6,9 @@ use super::error::DynamicsError;
 use super::force_law::ForceLawState;
 use super::forces::{Forces, MotionState};
 use super::head::{HeadModel, Linkage};
-use crate::elasticity::{Matrix6, Vector6, split, stack};
-use crate::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, gravity_in_world};
-use crate::time::Stamp;
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Trajectory, Vector, gravity_in_world};
+use zsim_base::time::Stamp;
+use zsim_elasticity::{Matrix6, Vector6, split, stack};
 
 /// Step of the central differences by the base's pose, m and rad.
 const DIFFERENCE: f64 = 1e-6;

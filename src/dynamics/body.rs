@@ -1,9 +1,9 @@
 //! Mass properties of the head.
 
 use super::spec::{HeadSpec, PartSpec};
-use crate::elasticity::{Matrix6, Vector6, blocks, split};
-use crate::geometry::{Matrix, Pose, Rotation, Vector};
-use crate::spec::{Source, SpecError};
+use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
+use zsim_base::spec::{Source, SpecError};
+use zsim_elasticity::{Matrix6, Vector6, blocks, split};
 
 /// Mass, centre of mass and inertia of the head.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@ use super::body::Body;
 use super::error::DynamicsError;
 use super::mount::Mount;
 use super::spec::HeadSpec;
-use crate::geometry::Pose;
-use crate::spec::Source;
+use zsim_base::geometry::Pose;
+use zsim_base::spec::Source;
 
 /// Largest mass that is tried, as a multiple of the mass of the head.
 const MAX_MASS_FACTOR: f64 = 1024.0;
@@ -79,7 +79,7 @@ pub fn stands_with_mass(spec: &HeadSpec, source: &Source, factor: f64) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{HeadModel, LinkageSpec, PartSpec, load};
+    use crate::{HeadModel, LinkageSpec, PartSpec, load};
 
     /// The handheld head with the mass of each part multiplied by `factor`.
     fn scaled(factor: f64) -> (HeadSpec, Source) {

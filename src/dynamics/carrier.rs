@@ -1,9 +1,9 @@
 //! Parts of the carrier that the laser can hit: an operator, a handle, a cart.
 
-use crate::geometry::Vector;
-use crate::spec::checked::{FiniteArray, Fraction, Positive};
-use crate::spec::{Source, SpecError};
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::Vector;
+use zsim_base::spec::checked::{FiniteArray, Fraction, Positive};
+use zsim_base::spec::{Source, SpecError};
 
 /// A part of the carrier: an upright cylinder, closed at both ends, fixed to the base.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]

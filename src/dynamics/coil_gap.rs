@@ -2,8 +2,8 @@
 
 use super::head::HeadModel;
 use super::mounted_spring::MountedSpring;
-use crate::elasticity::{ElasticityError, SpringState};
-use crate::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Vector};
+use zsim_elasticity::{ElasticityError, SpringState};
 
 /// The smallest gap between the coils of a spring at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,10 +5,10 @@ use super::force_law::{EndStop, ForceLaw, Hold};
 use super::modes::{FreeMotions, LinearModel, Mode, modal_damping, modal_sum, modes};
 use super::spec::{DampingSpec, EndStopSpec, HoldSpec};
 use super::statics::Statics;
-use crate::elasticity::{Matrix6, Vector6, blocks, split};
-use crate::geometry::{Matrix, Pose, Vector, gravity_in_world, skew};
-use crate::spec::{Source, SpecError};
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Matrix, Pose, Vector, gravity_in_world, skew};
+use zsim_base::spec::{Source, SpecError};
+use zsim_elasticity::{Matrix6, Vector6, blocks, split};
 
 /// A compliant linkage with its equilibrium and linear model.
 #[derive(Debug, Clone)]

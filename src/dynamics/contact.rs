@@ -2,8 +2,8 @@
 
 use super::coil_gap::CoilGaps;
 use super::head::HeadModel;
-use crate::geometry::{Kinematics, Pose};
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::{Kinematics, Pose};
 
 /// The coils of a spring touched and stopped each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

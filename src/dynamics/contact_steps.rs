@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::compliant::CompliantLinkage;
-use crate::elasticity::{Matrix6, Vector6};
+use zsim_elasticity::{Matrix6, Vector6};
 
 /// Divides the steps of a simulation while coils touch, and has the impulses of their contact force.
 ///

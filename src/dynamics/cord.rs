@@ -2,9 +2,9 @@
 
 use super::elements::{CableSpec, CordSpec, CordStiffnessSpec};
 use super::forces::{EndFrames, Forces, MotionState};
-use crate::elasticity::split;
-use crate::geometry::{Matrix, Pose, Vector};
 use nalgebra::Point3;
+use zsim_base::geometry::{Matrix, Pose, Vector};
+use zsim_elasticity::split;
 
 /// Stretch range over which a cord changes from slack to taut, as a fraction of the length.
 ///

@@ -1,9 +1,9 @@
 //! Spec types of the elements of a linkage.
 
 use super::placement::PlacementSpec;
-use crate::elasticity::{ElasticityError, SpringSpec};
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
+use zsim_elasticity::{ElasticityError, SpringSpec};
 
 /// An element between base and head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]

@@ -2,8 +2,8 @@
 
 use super::head::HeadModel;
 use super::mounted_spring::MountedSpring;
-use crate::elasticity::{ElasticityError, SpringState, split};
-use crate::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Vector};
+use zsim_elasticity::{ElasticityError, SpringState, split};
 
 /// Force and moment that the head exerts on an end of a spring, in the frame of that end.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,9 +53,9 @@ impl MountedSpring {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::head::Linkage;
-    use crate::dynamics::load;
-    use crate::geometry::gravity_in_world;
+    use crate::head::Linkage;
+    use crate::load;
+    use zsim_base::geometry::gravity_in_world;
 
     #[test]
     fn the_springs_bear_the_weight_of_the_head_and_its_moment() {

@@ -1,9 +1,9 @@
 //! Time integration of one free body by rapier; the only file that uses rapier's types.
 
 use super::body::Body;
-use crate::elasticity::{Vector6, split, stack};
-use crate::geometry::Pose;
 use rapier3d_f64::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use zsim_base::geometry::Pose;
+use zsim_elasticity::{Vector6, split, stack};
 
 /// A free rigid body in an empty world without gravity.
 ///

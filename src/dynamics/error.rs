@@ -1,5 +1,5 @@
-use crate::elasticity::ElasticityError;
-use crate::spec::SpecError;
+use zsim_base::spec::SpecError;
+use zsim_elasticity::ElasticityError;
 
 /// Errors of the head model and simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -2,10 +2,10 @@
 
 use super::elements::FloatSpec;
 use super::forces::{Forces, MotionState, at_lever};
-use crate::elasticity::{Vector6, split, stack};
-use crate::geometry::{Matrix, Pose, Vector};
 use nalgebra::Point3;
 use std::f64::consts::{PI, TAU};
+use zsim_base::geometry::{Matrix, Pose, Vector};
+use zsim_elasticity::{Vector6, split, stack};
 
 /// Number of columns in each ring of the float's cross-section.
 const DIRECTIONS: usize = 12;
@@ -141,9 +141,9 @@ impl Float {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::Body;
-    use crate::geometry::{Kinematics, gravity_in_world};
+    use crate::Body;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Kinematics, gravity_in_world};
 
     const SPEC: FloatSpec = FloatSpec {
         base_surface_m: [0.0, 0.0, 1.0],
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn buoyancy_is_the_gradient_of_the_energy_at_any_tilt() {
         let float = Float::of(&SPEC);
-        let turn = crate::geometry::Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.2));
+        let turn = zsim_base::geometry::Rotation::from_scaled_axis(Vector::new(0.5, -0.3, 0.2));
         for depth_m in [0.99, 1.0, 1.02, 0.5, 1.2] {
             let pose = Pose::from_parts(Vector::new(0.1, -0.2, depth_m).into(), turn);
             let energy =

@@ -6,13 +6,13 @@ use super::float::Float;
 use super::forces::{EndFrames, Forces, MotionState, RelativePose};
 use super::joint::UniversalJoint;
 use super::mounted_spring::MountedSpring;
-use crate::elasticity::{ElasticityError, Matrix6, SpringState, Vector6, split, stack};
-use crate::geometry::{Kinematics, Pose, Vector};
 use std::f64::consts::PI;
+use zsim_base::geometry::{Kinematics, Pose, Vector};
+use zsim_elasticity::{ElasticityError, Matrix6, SpringState, Vector6, split, stack};
 
 /// The force law of a linkage: the sum of the elements, modal damping, hand hold and end stop.
 ///
-/// Modal damping and hand hold act in the [`Deformation`](crate::elasticity::Deformation) coordinates e between the two
+/// Modal damping and hand hold act in the [`Deformation`](zsim_elasticity::Deformation) coordinates e between the two
 /// `reference` frames: the force `C e_dot` acts on the head through the transposed Jacobian of e. A rigid motion of
 /// head and base together leaves e unchanged and is therefore undamped; the dissipated power `e_dot . C e_dot` is never
 /// negative.

@@ -1,8 +1,8 @@
 //! Motion of head and base as input of the elements of a linkage, and the resulting forces.
 
 use super::body::Body;
-use crate::elasticity::{Deformation, Matrix6, Vector6, blocks, split, stack};
-use crate::geometry::{Kinematics, Matrix, Pose, Vector, skew};
+use zsim_base::geometry::{Kinematics, Matrix, Pose, Vector, skew};
+use zsim_elasticity::{Deformation, Matrix6, Vector6, blocks, split, stack};
 
 /// Poses and velocities of head and base at one time.
 pub(super) struct MotionState<'a> {

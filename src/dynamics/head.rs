@@ -11,9 +11,9 @@ use super::mount::{CompliantMount, LinkageOptions, Mount};
 use super::mounted_spring::MountedSpring;
 use super::spec::{HeadSpec, LinkageSpec};
 use super::statics::NoEquilibrium;
-use crate::elasticity::{ElasticityError, SpringState, stack};
-use crate::geometry::{Kinematics, Pose, gravity_in_world};
-use crate::spec::{Source, SpecError};
+use zsim_base::geometry::{Kinematics, Pose, gravity_in_world};
+use zsim_base::spec::{Source, SpecError};
+use zsim_elasticity::{ElasticityError, SpringState, stack};
 
 /// A head and the linkage that connects it to the base.
 ///

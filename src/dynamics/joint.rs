@@ -4,9 +4,9 @@ use super::body::Body;
 use super::elements::UniversalJointSpec;
 use super::engine::predicted_pose;
 use super::forces::{EndFrames, Forces, MotionState};
-use crate::elasticity::{Vector6, stack};
-use crate::geometry::{Pose, Rotation, Vector};
 use nalgebra::{Matrix4, Matrix6x4, Vector4};
+use zsim_base::geometry::{Pose, Rotation, Vector};
+use zsim_elasticity::{Vector6, stack};
 
 /// A universal joint: the cross has one arm on the base (the foot's x) and one on the head (the top's y).
 #[derive(Debug, Clone, Copy, PartialEq)]

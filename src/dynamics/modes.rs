@@ -1,9 +1,9 @@
 //! The head linearised about the equilibrium: matrices and modes.
 
 use super::spec::DampingSpec;
-use crate::elasticity::{Matrix6, Vector6};
 use nalgebra::{DMatrix, Dyn, OMatrix, U6};
 use std::f64::consts::TAU;
+use zsim_elasticity::{Matrix6, Vector6};
 
 /// The dominant motion of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]

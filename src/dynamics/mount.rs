@@ -11,9 +11,9 @@ use super::joint::UniversalJoint;
 use super::mounted_spring::{MountedSpring, WireMass};
 use super::spec::{DampingSpec, EndStopSpec, HoldSpec, LinkageSpec};
 use super::statics::{NoEquilibrium, Statics};
-use crate::elasticity::{ElasticityError, Matrix6, SpringDesign, SpringSpec, check_buckling};
-use crate::geometry::{Pose, Rotation, gravity_in_world};
-use crate::spec::{Source, SpecError};
+use zsim_base::geometry::{Pose, Rotation, gravity_in_world};
+use zsim_base::spec::{Source, SpecError};
+use zsim_elasticity::{ElasticityError, Matrix6, SpringDesign, SpringSpec, check_buckling};
 
 /// The mounting of a head, before any load.
 pub(super) enum Mount<'a> {

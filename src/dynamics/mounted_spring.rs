@@ -1,10 +1,10 @@
 //! A spring with mounting points and, optionally, wire mass.
 
 use super::forces::{EndFrames, Forces, MotionState, RelativePose};
-use crate::elasticity::{
+use zsim_base::geometry::{Matrix, Pose, Vector, skew};
+use zsim_elasticity::{
     Coil, Deformation, ElasticityError, Matrix6, Spring, SpringState, Vector6, blocks, split, stack,
 };
-use crate::geometry::{Matrix, Pose, Vector, skew};
 
 /// A spring and the frames of the mounting points.
 #[derive(Debug, Clone)]

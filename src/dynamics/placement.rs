@@ -1,11 +1,11 @@
 //! Placement of a part on the head.
 
-use crate::geometry::Pose;
-use crate::geometry::Vector;
-use crate::geometry::from_roll_pitch_yaw;
-use crate::spec::checked;
 use serde::Deserialize;
 use serde::Serialize;
+use zsim_base::geometry::Pose;
+use zsim_base::geometry::Vector;
+use zsim_base::geometry::from_roll_pitch_yaw;
+use zsim_base::spec::checked;
 
 /// The pose of a frame in another frame.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]

@@ -2,11 +2,11 @@
 
 use super::head::{HeadModel, Linkage};
 use super::modes::{LinearModel, Mode};
-use crate::elasticity::{Matrix6, Vector6, blocks};
-use crate::geometry::{Matrix, STANDARD_GRAVITY_M_PER_S2, Vector, skew};
-use crate::motion::Axis;
 use nalgebra::{Complex, Matrix6x1};
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Matrix, STANDARD_GRAVITY_M_PER_S2, Vector, skew};
+use zsim_elasticity::{Matrix6, Vector6, blocks};
+use zsim_motion::Axis;
 
 /// The acceleration whose gain is taken along x, y and z; about the axes it is always the angular rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -282,10 +282,10 @@ fn maximum(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{DampingSpec, HeadSpec, LinkageSpec, load};
-    use crate::elasticity::{SpringDesign, SpringSpec, StiffnessRow, loaded_stiffness};
-    use crate::spec::{Source, parse};
+    use crate::{DampingSpec, HeadSpec, LinkageSpec, load};
     use approx::assert_relative_eq;
+    use zsim_base::spec::{Source, parse};
+    use zsim_elasticity::{SpringDesign, SpringSpec, StiffnessRow, loaded_stiffness};
 
     fn head(change: impl FnOnce(&mut HeadSpec)) -> HeadModel {
         let (mut spec, source) = load("handheld").unwrap();

@@ -11,11 +11,11 @@ use super::forces::{Forces, MotionState};
 use super::head::{HeadModel, Linkage};
 use super::joint::UniversalJoint;
 use super::statics::Statics;
-use crate::elasticity::{Matrix6, Vector6, split, stack};
-use crate::geometry::{Kinematics, Pose, Rotation, Vector, gravity_in_world};
-use crate::motion::BaseMotion;
 use nalgebra::{Cholesky, U6};
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector, gravity_in_world};
+use zsim_elasticity::{Matrix6, Vector6, split, stack};
+use zsim_motion::BaseMotion;
 
 /// The motion of head and base at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,9 +4,9 @@ use super::actuated::MotorSpec;
 use super::carrier::CarrierSpec;
 use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
 pub use super::placement::PlacementSpec;
-use crate::elasticity::SpringSpec;
-use crate::spec::{Kind, Source, SpecError, checked, find, name_from, parse};
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find, name_from, parse};
+use zsim_elasticity::SpringSpec;
 
 /// A head, the linkage to the base, and the carrier.
 ///
@@ -247,4 +247,18 @@ pub struct HoldSpec {
     /// Damping ratio of that oscillation.
     #[serde(with = "checked::NonNegative")]
     pub damping_ratio: f64,
+}
+
+impl NamedSpec for HeadSpec {
+    const KIND: Kind = Kind::Head;
+    type Error = SpecError;
+
+    /// Replaces a spring that is given by name by its description, so that its settings can be varied.
+    fn resolved(self, source: &Source) -> Result<Self, SpecError> {
+        let mut head = self.with_files_of(source);
+        if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
+            *spring = spring.resolved()?;
+        }
+        Ok(head)
+    }
 }

@@ -3,8 +3,8 @@
 use super::body::Body;
 use super::force_law::{ForceLaw, ForceLawState};
 use super::forces::{Forces, MotionState};
-use crate::elasticity::{ElasticityError, Matrix6, Vector6, conditioning, split};
-use crate::geometry::{Kinematics, Pose, Rotation, Vector};
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector};
+use zsim_elasticity::{ElasticityError, Matrix6, Vector6, conditioning, split};
 
 /// Maximum Newton iterations for the equilibrium.
 const MAX_ITERATIONS: usize = 80;

@@ -44,7 +44,7 @@ fn angle_excess(coil: &Coil, load_n: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::elasticity::Moduli;
+    use crate::Moduli;
 
     #[test]
     fn loads_above_80_percent_of_the_buckling_load_are_refused() {

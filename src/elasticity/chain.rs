@@ -3,7 +3,7 @@
 use super::deformation::{blocks, split, stack};
 use super::solutions::Solutions;
 use super::{Deformation, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
-use crate::geometry::{Matrix, Pose, Rotation, Vector, left_jacobian, skew};
+use zsim_base::geometry::{Matrix, Pose, Rotation, Vector, left_jacobian, skew};
 
 /// Maximum Newton iterations.
 const MAX_ITERATIONS: usize = 100;

@@ -103,8 +103,8 @@ impl Overlap {
 mod tests {
     use super::super::{Moduli, Spring};
     use super::*;
-    use crate::geometry::{Pose, Rotation, Vector};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Pose, Rotation, Vector};
 
     const STOP: CoilStop = CoilStop { open_m: 0.01, radius_m: 0.0125, stiffness_n_per_m: 1e4 };
 

@@ -1,7 +1,7 @@
 //! Deformation of a spring in corotational coordinates.
 
 use super::{Matrix6, Vector6};
-use crate::geometry::{Matrix, Pose, Vector, skew};
+use zsim_base::geometry::{Matrix, Pose, Vector, skew};
 
 /// The logarithm of the top's pose relative to the base, and the rate of change.
 ///
@@ -133,8 +133,8 @@ pub fn blocks(a: &Matrix, b: &Matrix, c: &Matrix, d: &Matrix) -> Matrix6 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Rotation, left_jacobian};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Rotation, left_jacobian};
 
     #[test]
     fn an_arc_of_constant_curvature_has_a_bending_coordinate_only() {

@@ -3,7 +3,7 @@
 use super::coil_stop::CoilStop;
 use super::deformation::{blocks, split, stack};
 use super::{Column, Deformation, ElasticityError, Matrix6, SectionLoad, Vector6, conditioning, loaded_stiffness};
-use crate::geometry::{Matrix, Pose, Vector, skew};
+use zsim_base::geometry::{Matrix, Pose, Vector, skew};
 
 /// A segment of a spring between two nodes, straight under an axial load in the reference state.
 ///
@@ -143,8 +143,8 @@ fn check_symmetric(k: &Matrix6) -> Result<(), ElasticityError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Rotation;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Rotation;
 
     /// A stiffness of a spring of 120 mm with couplings between all coordinates, N, m, rad.
     fn coupled() -> Matrix6 {

@@ -3,7 +3,7 @@
 pub enum ElasticityError {
     /// The named spring does not exist, or the file is invalid.
     #[error(transparent)]
-    Spec(#[from] crate::spec::SpecError),
+    Spec(#[from] zsim_base::spec::SpecError),
     /// The spring index is too small for the formulas.
     #[error(
         "the wire of {wire_mm} mm is too thick for a coil of {coil_mm} mm: their ratio, the spring index, is {index:.2}; \

@@ -2,8 +2,8 @@
 
 use super::deformation::split;
 use super::{ElasticityError, Matrix6, Spring, SpringState, Vector6};
-use crate::geometry::{Pose, Rotation, Vector};
 use nalgebra::{Matrix2, Vector2};
+use zsim_base::geometry::{Pose, Rotation, Vector};
 
 /// Maximum Newton iterations.
 const MAX_ITERATIONS: usize = 50;

@@ -99,7 +99,7 @@ pub fn loaded_stiffness(column: &Column) -> Result<Matrix6, ElasticityError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::elasticity::{Coil, Moduli, buckling_load_n};
+    use crate::{Coil, Moduli, buckling_load_n};
     use approx::assert_relative_eq;
 
     fn steel(coil_mm: f64, wire_mm: f64, coils: f64, length_mm: f64) -> Coil {

@@ -14,8 +14,8 @@
 
 use super::deformation::blocks;
 use super::{Coil, ElasticityError, Matrix6};
-use crate::geometry::{Matrix, Pose, Rotation, Vector, skew};
 use nalgebra::{Matrix2, SMatrix, UnitQuaternion, Vector2};
+use zsim_base::geometry::{Matrix, Pose, Rotation, Vector, skew};
 
 /// Maximum Newton iterations for the loaded helix.
 const MAX_ITERATIONS: usize = 50;

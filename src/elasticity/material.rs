@@ -1,8 +1,8 @@
 //! Materials of wires: moduli, density and strength.
 
 use super::Moduli;
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
 
 /// Material of a wire.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
@@ -139,8 +139,8 @@ impl Material {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Source, parse};
     use approx::assert_relative_eq;
+    use zsim_base::spec::{Source, parse};
 
     #[test]
     fn the_endurance_of_music_wire_is_that_of_the_textbook() {

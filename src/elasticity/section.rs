@@ -1,7 +1,7 @@
 //! The load on a cross-section of a spring, and the gap between its coils there.
 
 use super::{Coil, Vector6, split};
-use crate::geometry::Pose;
+use zsim_base::geometry::Pose;
 
 /// The part of the load on a cross-section that moves the coils towards each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,8 +72,8 @@ impl Coil {
 mod tests {
     use super::super::{Moduli, Spring};
     use super::*;
-    use crate::geometry::{Rotation, Vector};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Rotation, Vector};
 
     fn coil() -> Coil {
         Coil::new(0.025, 0.003, 12.0, 0.12, Moduli { youngs_pa: 206e9, shear_pa: 79.3e9 }).unwrap()

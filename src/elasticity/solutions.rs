@@ -1,7 +1,7 @@
 //! The last solutions for the nodes of a chain, from which the next one is predicted.
 
-use crate::geometry::{Pose, Rotation};
 use nalgebra::Unit;
+use zsim_base::geometry::{Pose, Rotation};
 
 /// Largest error of the predicted position and quaternion of the top, as a fraction of the change since the last solution.
 const MAX_ERROR: f64 = 0.3;

@@ -1,8 +1,8 @@
 //! Specs of springs.
 
 use super::{Coil, ElasticityError, Material, Matrix6, Spring, Winding};
-use crate::spec::{Kind, SpecError, checked};
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::{Kind, SpecError, checked};
 
 /// Spec of a spring: `specs/springs/NAME.ron`, or a value within a head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
@@ -157,7 +157,7 @@ impl SpringSpec {
     /// When there is no spring of that name, or the file is invalid or names another spring.
     pub fn resolved(&self) -> Result<SpringSpec, SpecError> {
         let SpringSpec::Named(name) = self else { return Ok(self.clone()) };
-        match crate::spec::load(Kind::Spring, name)? {
+        match zsim_base::spec::load(Kind::Spring, name)? {
             SpringSpec::Named(other) => {
                 let message = format!("the spring names another spring, \"{other}\"; it must be a coil or a stiffness");
                 Err(SpecError::plain(name, message))

@@ -5,7 +5,7 @@ use super::coil_stop::CoilStop;
 use super::deformation::{Deformation, split, stack};
 use super::helix::{Helix, about_axis};
 use super::{Coil, Column, ElasticityError, Element, Matrix6, SectionLoad, Vector6};
-use crate::geometry::Pose;
+use zsim_base::geometry::Pose;
 
 /// Maximum number of segments of a spring.
 pub const MAX_SEGMENTS: usize = 64;

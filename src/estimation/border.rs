@@ -4,8 +4,8 @@ use super::consider::{IMU_OFFSET, IMU_STATES, StartMatrix};
 use super::normal_equations::{Factor, NormalEquations};
 use super::residual::prior::add_border;
 use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
-use crate::measurement::ImuNoise;
 use nalgebra::{SMatrix, SVector};
+use zsim_base::measurement::ImuNoise;
 
 /// Random walk of the clock offset in addition to the rate, s per square root of a second.
 const CLOCK_WALK_S_PER_SQRT_S: f64 = 5e-6;

@@ -2,9 +2,9 @@
 
 use super::strapdown::{Biases, State};
 use super::{EstimationError, EstimatorSpec, base};
-use crate::geometry::{Kinematics, Pose, Trajectory, Vector, gravity_in_world};
-use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
-use crate::time::Span;
+use zsim_base::geometry::{Kinematics, Pose, Trajectory, Vector, gravity_in_world};
+use zsim_base::measurement::{ImuAveraging, ImuNoise, ImuSample};
+use zsim_base::time::Span;
 
 /// Integrates IMU `samples` as the estimator does, with zero biases, from the motion `start` of the IMU frame.
 ///

@@ -1,6 +1,6 @@
-use crate::geometry::{TrajectoryError, Vector};
-use crate::time::Stamp;
 use std::fmt;
+use zsim_base::geometry::{TrajectoryError, Vector};
+use zsim_base::time::Stamp;
 
 /// The reason why there is no estimate.
 #[derive(Debug, thiserror::Error, PartialEq)]

@@ -4,8 +4,8 @@
 //! nodes) would fill it. They are placed on a time axis on which no gap exceeds [`MAX_GAP_S`].
 
 use super::observed::{LidarCorrectionPeriod, MotionByViews, ObservedSurfel, ObservedSurfels};
-use crate::geometry::{PoseCovariance, Trajectory, TrajectoryError};
-use crate::time::{Span, Stamp};
+use zsim_base::geometry::{PoseCovariance, Trajectory, TrajectoryError};
+use zsim_base::time::{Span, Stamp};
 
 /// Longer gaps are shortened to this, s; it is longer than any interaction across a gap.
 const MAX_GAP_S: f64 = 10.0;
@@ -76,7 +76,7 @@ pub(super) fn restored(shortened: &Trajectory, stamps: &[Stamp]) -> Result<Traje
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose;
+    use zsim_base::geometry::Pose;
 
     fn at(seconds: f64) -> Stamp {
         Stamp::from_nanos(1_349_049_600_000_000_000) + Span::from_seconds(seconds)

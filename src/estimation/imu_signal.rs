@@ -1,8 +1,8 @@
 //! The IMU readings as a signal over IMU time.
 
 use super::strapdown::Interval;
-use crate::geometry::Vector;
 use std::collections::VecDeque;
+use zsim_base::geometry::Vector;
 
 /// Readings as a function of IMU time: linear in each interval, and extrapolated before the first and after the last one.
 #[derive(Debug, Clone, Default)]

@@ -8,9 +8,9 @@ use super::residual::{
 use super::spec::EstimatorSpec;
 use super::strapdown::{Biases, Interval, State};
 use super::unknowns::Unknowns;
-use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
-use crate::measurement::ImuNoise;
 use nalgebra::{SMatrix, SVector};
+use zsim_base::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
+use zsim_base::measurement::ImuNoise;
 
 /// Standard deviations of offset (s) and rate (s/s) if the clock is not estimated: small enough to fix both.
 const FIXED_CLOCK_SIGMA: (f64, f64) = (1e-9, 1e-12);

@@ -6,9 +6,9 @@ use super::map::{LocalisedPose, MAP_LIMITS, RelocalisationLimits, Relocaliser, m
 use super::surfel::Patch;
 use super::window::Window;
 use super::{EstimationError, EstimatorSpec};
-use crate::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
-use crate::surfel_map::SurfelMap;
 use nalgebra::Matrix6;
+use zsim_base::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
+use zsim_base::surfel_map::SurfelMap;
 
 /// Localisation of the head in a given map.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use super::spline::Basis;
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
-use crate::geometry::{Matrix, Pose, Rotation, Vector};
+use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
 
 /// Nominal trajectory: states at the boundaries of the IMU intervals, in IMU time unless the formulation is the paper's.
 ///

@@ -1,11 +1,11 @@
 //! Surfaces observed by the open loop, the input of the global registration.
 
 use super::surfel::Patch;
-use crate::geometry::{Pose, Trajectory};
-use crate::measurement::LidarCorrection;
-use crate::time::{Span, Stamp};
 use nalgebra::Matrix6;
 use rayon::prelude::*;
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::measurement::LidarCorrection;
+use zsim_base::time::{Span, Stamp};
 
 /// Surface patches observed by the open loop, in the map frame, each with its time.
 ///

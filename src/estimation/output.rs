@@ -1,9 +1,9 @@
 //! Output of the estimator.
 
 use super::{LocalisedPose, ObservedSurfels, Timing, Warning, WarningKind};
-use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
-use crate::measurement::LidarCorrection;
-use crate::time::Stamp;
+use zsim_base::geometry::{Pose, PoseCovariance, Trajectory, Vector};
+use zsim_base::measurement::LidarCorrection;
+use zsim_base::time::Stamp;
 
 /// Length of the initial part over which a trajectory is aligned with the truth when errors are reported, s.
 pub const ALIGNMENT_S: f64 = 20.0;

@@ -2,8 +2,8 @@
 
 use super::EstimatorSpec;
 use super::spec::SurfelSpec;
-use crate::geometry::Vector;
-use crate::measurement::LidarScan;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::LidarScan;
 
 /// Point rate from which on the minimum number of points of a surfel is as specified, points/s; lower in proportion for
 /// a sparser lidar.
@@ -82,9 +82,9 @@ pub(super) fn is_in_plane(point_in_laser: &nalgebra::Vector3<f32>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::load;
-    use crate::measurement::LidarReturn;
-    use crate::time::{Span, Stamp};
+    use crate::load;
+    use zsim_base::measurement::LidarReturn;
+    use zsim_base::time::{Span, Stamp};
 
     /// A scan with beams at `azimuths` and `elevation`, rad.
     fn scan(azimuths: impl Iterator<Item = f64>, elevation: f64) -> LidarScan {

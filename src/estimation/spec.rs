@@ -1,22 +1,22 @@
 pub use super::surfel_spec::{MatchingSpec, SurfelSpec};
 
 use super::{EstimationError, RegistrationSpec};
-use crate::spec::{Kind, SpecError};
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::{Kind, NamedSpec, SpecError};
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EstimatorSpec {
     /// Length of the sliding window, s. A longer window uses more matches and takes longer to solve.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub window_s: f64,
     /// Step by which the window advances, s; at most half of `window_s`. Also the length of the segments whose surfels are
     /// added and removed together.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub step_s: f64,
     /// Knot spacing of the correction splines, s; 0.03 s to `step_s`.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub knot_spacing_s: f64,
     /// Time of the trajectory and form of the IMU residuals.
     #[serde(default)]
@@ -61,29 +61,29 @@ pub struct SolveSpec {
     /// Maximum number of iterations: match, then solve.
     pub max_iterations: usize,
     /// Iterations end when the largest correction is below this, m or rad.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub settled_m: f64,
     /// Threshold of the Cauchy kernel in the first iteration, in standard deviations.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub cauchy_start: f64,
     /// Threshold of the Cauchy kernel in the last iteration, in standard deviations.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub cauchy_end: f64,
     /// Standard deviation of the match distance in addition to the surfel thickness, m (`sigma_r` in Bosse et al. 2012).
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub match_sigma_m: f64,
     /// Factor on the information of a match; below 1 if the errors of matches on a surface are correlated.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub match_weight: f64,
     /// Minimum number of matches of a window; with fewer, the window is dead reckoning with the IMU.
     pub min_matches: usize,
     /// Factor on the covariance added by the measurements of a window. It accounts for correlations that the equations
     /// ignore: errors of matches on a surface, and measurements common to overlapping windows.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub covariance_inflation: f64,
     /// Conditioning below which the geometry of a window is degenerate: smallest over largest eigenvalue of the position
     /// information of the matches.
-    #[serde(with = "crate::spec::checked::NonNegative")]
+    #[serde(with = "zsim_base::spec::checked::NonNegative")]
     pub weak_conditioning: f64,
 }
 
@@ -92,27 +92,27 @@ pub struct SolveSpec {
 #[serde(deny_unknown_fields)]
 pub struct InertialSpec {
     /// Factor on the calibrated noise densities; accounts for errors that are not white.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub noise_inflation: f64,
     /// Prior standard deviation of the estimated scale errors and misalignments of the gyroscope, 0..1; 0 to estimate
     /// none.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub gyro_matrix_sigma: f64,
     /// The same for the accelerometer.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub accel_matrix_sigma: f64,
     /// Residual error of the gyroscope in proportion to the reading, added to the noise, 0..1.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub gyro_scale_error: f64,
     /// Residual error of the accelerometer in proportion to the reading, added to the noise, 0..1.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub accel_scale_error: f64,
     /// Longest IMU gap that is bridged by interpolation, s; gaps above 0.13 s only where the motion before them is slow
     /// enough. After other gaps the estimate restarts and relocalises in the surfaces seen before.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub max_gap_s: f64,
     /// Duration of the initial rest, s. Rest or motion is decided from this time at the start.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub rest_s: f64,
 }
 
@@ -123,16 +123,16 @@ pub struct ClockSpec {
     /// Whether clock offset and rate are estimated; if not, the offset is `start_s`.
     pub estimated: bool,
     /// Initial clock offset, s, positive if IMU stamps are later: 0, or the estimate of an earlier run.
-    #[serde(with = "crate::spec::checked::Finite")]
+    #[serde(with = "zsim_base::spec::checked::Finite")]
     pub start_s: f64,
     /// Standard deviation of `start_s`, s.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub start_sigma_s: f64,
     /// Prior standard deviation of the clock rate, parts per million.
-    #[serde(with = "crate::spec::checked::NonNegative")]
+    #[serde(with = "zsim_base::spec::checked::NonNegative")]
     pub drift_ppm: f64,
     /// Minimum jitter of the stamps assumed by the stamp filter, s; 0 disables the filter.
-    #[serde(with = "crate::spec::checked::NonNegative")]
+    #[serde(with = "zsim_base::spec::checked::NonNegative")]
     pub jitter_s: f64,
 }
 
@@ -143,10 +143,10 @@ pub struct ExtrinsicsSpec {
     /// Whether rotation and translation are estimated; if not, they are as calibrated.
     pub estimated: bool,
     /// Prior standard deviation of the rotation about each axis, degrees.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub rotation_sigma_deg: f64,
     /// Prior standard deviation of the translation along each axis, m.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub translation_sigma_m: f64,
 }
 
@@ -162,10 +162,10 @@ impl ExtrinsicsSpec {
 #[serde(deny_unknown_fields)]
 pub struct ViewSpec {
     /// Duration of a view, s; at least `step_s`.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub length_s: f64,
     /// A new view is stored if the stored ones cover less than this fraction of its cells (1 m).
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub keep_below_coverage: f64,
     /// Maximum number of stored views, at least `fixed_views`; limits the memory of the estimator.
     pub max_kept: usize,
@@ -178,7 +178,7 @@ pub struct ViewSpec {
 /// # Errors
 /// If the spec does not exist or is invalid.
 pub fn load(name: &str) -> Result<EstimatorSpec, SpecError> {
-    crate::spec::load(Kind::Estimator, name)
+    zsim_base::spec::load(Kind::Estimator, name)
 }
 
 impl EstimatorSpec {
@@ -227,6 +227,11 @@ impl EstimatorSpec {
         require(self.views.length_s >= step, "length_s", format!("must be at least step_s = {step} s"))?;
         self.registration.check()
     }
+}
+
+impl NamedSpec for EstimatorSpec {
+    const KIND: Kind = Kind::Estimator;
+    type Error = SpecError;
 }
 
 #[cfg(test)]

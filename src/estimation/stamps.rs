@@ -5,8 +5,8 @@
 //! drifting rate, the error of the smoothed stamps is a few hundredths of `s` after a minute.
 
 use super::EstimatorSpec;
-use crate::signal::{Regularity, StampPattern, first_on_time_s, lost_before};
-use crate::time::{Span, Stamp};
+use zsim_base::signal::{Regularity, StampPattern, first_on_time_s, lost_before};
+use zsim_base::time::{Span, Stamp};
 
 /// Random walk of the sampling rate, relative, per square root of a second: 0.2 ppm, as of a quartz at room temperature.
 const RATE_WALK_PER_SQRT_S: f64 = 2e-7;

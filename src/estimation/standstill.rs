@@ -5,9 +5,9 @@
 //! parallel walls it is unknown.
 
 use super::surfel::TimedReturn;
-use crate::geometry::{Matrix, Vector};
 use nalgebra::SymmetricEigen;
 use std::collections::BTreeMap;
+use zsim_base::geometry::{Matrix, Vector};
 
 /// Cell size in azimuth and elevation, rad.
 const CELL_RAD: f64 = 0.05;

@@ -13,7 +13,7 @@
 //! At 400 degrees/s and 100 Hz the last term is 2 mm/s^2; without it, the error would look like a bias. An IMU that
 //! compensates for coning and sculling delivers these sums divided by `h`: the terms must not be added again.
 
-use crate::geometry::{Matrix, Rotation, Vector};
+use zsim_base::geometry::{Matrix, Rotation, Vector};
 
 /// IMU readings over an interval, in the IMU frame; see the module for their relation to the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,7 +145,7 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::gravity_in_world;
+    use zsim_base::geometry::gravity_in_world;
 
     #[test]
     fn the_rotation_between_accelerometer_and_gyroscope_axes_is_recovered() {

@@ -6,8 +6,8 @@ use super::residual::{
     RANGE,
 };
 use super::strapdown::{Biases, ImuScaleMisalignment};
-use crate::geometry::{Matrix, Rotation, Vector, gravity_in_world};
-use crate::measurement::LidarCorrection;
+use zsim_base::geometry::{Matrix, Rotation, Vector, gravity_in_world};
+use zsim_base::measurement::LidarCorrection;
 
 /// The unknowns in the border of the normal equations.
 #[derive(Debug, Clone, Copy, PartialEq)]

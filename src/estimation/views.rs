@@ -7,8 +7,8 @@
 use super::matching::{Matcher, SearchTrees};
 use super::spec::ViewSpec;
 use super::surfel::{Patch, PlacedSurfel, Sighting};
-use crate::geometry::Vector;
-use crate::measurement::LidarCorrection;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::LidarCorrection;
 
 /// Edge length of the cells with which the coverage of views is compared, m.
 const CELL_M: f64 = 1.0;
@@ -249,8 +249,8 @@ fn remove(from: &mut Vec<u64>, others: &[u64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::load;
-    use crate::geometry::{Matrix, Rotation};
+    use crate::load;
+    use zsim_base::geometry::{Matrix, Rotation};
 
     /// A wall 3 m ahead of a lidar at the origin, by the calibration, as `lidar` places it.
     fn wall(lidar: &LidarCorrection) -> SeenPatch {

@@ -1,6 +1,6 @@
 use super::Pairs;
-use crate::geometry::{Pose, Vector};
-use crate::time::Stamp;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::time::Stamp;
 
 /// The errors of an estimate over time, in the world.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -70,8 +70,8 @@ fn root_mean_square(vectors: &[Vector]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Trajectory, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Trajectory, from_roll_pitch_yaw};
 
     /// A walk round a tilted square with the head nodding, 1000 poses at 100 Hz.
     fn walk() -> Trajectory {

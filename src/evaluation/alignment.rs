@@ -1,6 +1,6 @@
 use super::EvaluationError;
-use crate::geometry::{Matrix, Pose, Rotation, Vector};
 use nalgebra::Rotation3;
+use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
 
 /// Ratio of the second to the first singular value of the scatter below which points are collinear.
 const COLLINEAR: f64 = 1e-12;
@@ -60,8 +60,8 @@ fn least_squares(to: &[Vector], from: &[Vector], turns: &Matrix) -> Result<Pose,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     fn helix(count: usize) -> Vec<Vector> {
         let point = |t: f64| Vector::new(2.0 * t.cos(), 2.0 * t.sin(), 0.1 * t);

@@ -1,4 +1,4 @@
-use crate::time::Stamp;
+use zsim_base::time::Stamp;
 
 /// Error of an estimated clock offset.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,5 +1,5 @@
-use crate::geometry::{Surface, Vector};
 use rayon::prelude::*;
+use zsim_base::geometry::{Surface, Vector};
 
 /// Which points of a cloud are evaluated: a bounded number, spread evenly over it, always the same ones.
 ///
@@ -82,8 +82,8 @@ impl CloudErrors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::SurfacePoint;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::SurfacePoint;
 
     /// The floor z = 0, with the normal pointing down.
     struct Floor;

@@ -1,6 +1,6 @@
 use super::Pairs;
-use crate::geometry::{Matrix, Pose, PoseCovariance, Vector};
-use crate::time::{Span, Stamp};
+use zsim_base::geometry::{Matrix, Pose, PoseCovariance, Vector};
+use zsim_base::time::{Span, Stamp};
 
 /// Time between samples of the errors; errors within a shorter time are highly correlated.
 const SAMPLE_PERIOD: Span = Span::from_nanos(1_000_000_000);
@@ -54,8 +54,8 @@ fn nees(estimate: &Pose, truth: &Pose, covariance: &PoseCovariance) -> Option<[f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Rotation, Trajectory};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Rotation, Trajectory};
 
     #[test]
     fn an_error_of_one_standard_deviation_on_each_axis_has_a_nees_of_three() {

@@ -1,8 +1,8 @@
 use super::EvaluationError;
-use crate::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2, Trajectory, Vector};
-use crate::measurement::ImuSample;
-use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
+use zsim_base::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2, Trajectory, Vector};
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::{Span, Stamp};
 
 /// Time between output poses.
 const OUTPUT_PERIOD: Span = Span::from_nanos(100_000_000);
@@ -180,8 +180,8 @@ fn level(specific_force: &Vector) -> Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Kinematics, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Kinematics, from_roll_pitch_yaw};
 
     /// At rest for 2 s, then `x = a (1 - cos w s)^2 / 4` forward while pitching by the same law: smooth, back and
     /// forth.

@@ -1,5 +1,5 @@
 use super::{Errors, EvaluationError, Pairs};
-use crate::estimation::ALIGNMENT_S;
+use zsim_estimation::ALIGNMENT_S;
 
 /// Duration of the interval at the end over which the error is averaged, s.
 pub const TAIL_S: f64 = 5.0;
@@ -51,9 +51,9 @@ pub fn drift(pairs: &Pairs) -> Result<Drift, EvaluationError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Pose, Rotation, Trajectory, Vector};
-    use crate::time::Stamp;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Pose, Rotation, Trajectory, Vector};
+    use zsim_base::time::Stamp;
 
     /// Two minutes round a room at 50 Hz, distorted by `error` as a function of the time in minutes.
     fn walk(error: impl Fn(f64) -> Pose) -> Trajectory {

@@ -1,6 +1,6 @@
 use super::EvaluationError;
-use crate::geometry::{Pose, Trajectory, Vector};
-use crate::time::{Span, Stamp};
+use zsim_base::geometry::{Pose, Trajectory, Vector};
+use zsim_base::time::{Span, Stamp};
 
 /// Estimated poses, each with the true pose of the same time.
 #[derive(Debug, Clone, PartialEq, Default)]

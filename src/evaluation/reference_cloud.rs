@@ -1,7 +1,7 @@
 //! A reference cloud as surface elements, from which other clouds are measured.
 
-use crate::geometry::{Matrix, Surface, SurfacePoint, Vector};
 use std::collections::BTreeMap;
+use zsim_base::geometry::{Matrix, Surface, SurfacePoint, Vector};
 
 /// Edge of the voxels, m: an office wall has 30 points of the paper's reference laser in one after a minute.
 const EDGE_M: f64 = 0.2;
@@ -119,9 +119,9 @@ impl Surface for ReferenceCloud {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::CloudErrors;
-    use crate::geometry::Rotation;
+    use crate::CloudErrors;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Rotation;
 
     /// A wall of 4 m by 2 m, tilted, with a deviation along its normal as a function of the index of the point.
     fn wall(deviation_m: impl Fn(usize) -> f64) -> Vec<Vector> {

@@ -1,6 +1,6 @@
 use super::{EvaluationError, Pairs};
-use crate::geometry::{Pose, Vector};
-use crate::time::Span;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::time::Span;
 
 /// Error of the motion within a fixed time or length of the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,9 +88,9 @@ fn root_mean_square(pairs: &Pairs, indices: impl Iterator<Item = (usize, usize)>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Trajectory;
-    use crate::time::Stamp;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Trajectory;
+    use zsim_base::time::Stamp;
 
     #[test]
     fn a_scale_error_is_proportional_to_the_distance() {

@@ -1,6 +1,6 @@
 use super::{Drift, Errors, EvaluationError, Pairs, RelativeError, drift, relative_error, relative_error_over_path};
-use crate::geometry::{Trajectory, Vector};
-use crate::time::Span;
+use zsim_base::geometry::{Trajectory, Vector};
+use zsim_base::time::Span;
 
 /// The errors of a trajectory: absolute, relative, and drift.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,9 +92,9 @@ fn coverage(pairs: &Pairs, truth: &Trajectory) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose;
-    use crate::time::Stamp;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Pose;
+    use zsim_base::time::Stamp;
 
     /// A pose at 100 Hz on a circle with a radius of 2 m, `error_m` too far out.
     fn on_circle(k: i64, error_m: f64) -> (Stamp, Pose) {

@@ -1,6 +1,6 @@
 //! The motion of the base.
 
-use crate::geometry::Kinematics;
+use zsim_base::geometry::Kinematics;
 
 /// The prescribed motion of the base.
 pub trait BaseMotion: Send + Sync {

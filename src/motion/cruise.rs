@@ -3,8 +3,8 @@
 use super::BaseMotion;
 use super::jet::PoseJet;
 use super::stand::start_on_route;
-use crate::geometry::{Kinematics, Route, Vector};
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::{Kinematics, Route, Vector};
 
 /// A base at constant velocity from the start of the run.
 ///
@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct CruiseSpec {
     /// Height of the base above the floor, m.
-    #[serde(with = "crate::spec::checked::Finite")]
+    #[serde(with = "zsim_base::spec::checked::Finite")]
     pub height_m: f64,
     /// Speed, m/s.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub speed_m_per_s: f64,
 }
 

@@ -1,10 +1,10 @@
 //! Drops: the walker steps down, falls freely, and lands with a shock.
 
 use super::jet::Jet;
-use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::spec::checked::{NonNegative, Positive};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use zsim_base::geometry::STANDARD_GRAVITY_M_PER_S2;
+use zsim_base::spec::checked::{NonNegative, Positive};
 
 /// A step down: a free fall that ends in a landing shock. The base stays lower by `height_m` afterwards.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,4 +1,4 @@
-use crate::spec::SpecError;
+use zsim_base::spec::SpecError;
 
 /// Longest run, s: 7 days. A recording of that length exceeds 600 GB.
 pub const MAX_DURATION_S: f64 = 604_800.0;

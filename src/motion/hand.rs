@@ -14,12 +14,12 @@ use super::stand::start_on_route;
 use super::stops::StopsSpec;
 use super::walk::{RouteMotion, WalkSpec};
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Pose, Route, Vector};
-use crate::random::Seed;
-use crate::spec::Source;
-use crate::spec::checked::{Finite, Fraction, NonNegative, Positive};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
+use zsim_base::geometry::{Kinematics, Pose, Route, Vector};
+use zsim_base::random::Seed;
+use zsim_base::spec::Source;
+use zsim_base::spec::checked::{Finite, Fraction, NonNegative, Positive};
 
 /// A hand that moves and shakes the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -61,7 +61,7 @@ pub enum CarrySpec {
     /// paper's pseudostationary experiment, section IV-A).
     Box {
         /// Size forward and to the left, m.
-        #[serde(with = "crate::spec::checked::PositiveArray::<2>")]
+        #[serde(with = "zsim_base::spec::checked::PositiveArray::<2>")]
         size_m: [f64; 2],
         /// Number of rounds.
         rounds: u32,

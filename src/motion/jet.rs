@@ -1,7 +1,7 @@
 //! Forward-mode differentiation: a function of time with first and second derivative.
 
-use crate::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector, from_roll_pitch_yaw};
 
 /// Value of a function of time with first and second derivative.
 ///

@@ -5,12 +5,12 @@ use super::oscillator::BandLimitedNoise;
 use super::sines::{SineSum, SpectralLine};
 use super::walk::{RouteMotion, WalkSpec};
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Route};
-use crate::random::Seed;
-use crate::spec::Source;
-use crate::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::{Kinematics, Route};
+use zsim_base::random::Seed;
+use zsim_base::spec::Source;
+use zsim_base::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
 
 /// A legged robot that carries the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -116,10 +116,10 @@ impl BaseMotion for Legged {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::motion::{MotionSpec, load};
-    use crate::signal::{Segments, power_density};
+    use crate::{MotionSpec, load};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Vector;
+    use zsim_base::signal::{Segments, power_density};
 
     #[test]
     fn a_trot_bounces_twice_a_stride() {

@@ -10,14 +10,14 @@ use super::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
 use super::smooth::SmoothSteps;
 use super::stand::start_on_route;
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Pose, Route, STANDARD_GRAVITY_M_PER_S2};
-use crate::random::{Seed, Stream};
-use crate::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
-use crate::spec::{Source, SpecError};
 use nalgebra::Complex;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
+use zsim_base::geometry::{Kinematics, Pose, Route, STANDARD_GRAVITY_M_PER_S2};
+use zsim_base::random::{Seed, Stream};
+use zsim_base::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
+use zsim_base::spec::{Source, SpecError};
 
 /// A vessel in waves that carries the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -224,8 +224,8 @@ impl BaseMotion for Marine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::signal::{Segments, power_density};
     use approx::assert_relative_eq;
+    use zsim_base::signal::{Segments, power_density};
 
     fn sea(peakedness: f64) -> SeaSpec {
         SeaSpec { significant_height_m: 2.0, peak_period_s: 8.0, peakedness, going_deg: 0.0, spreading: 50.0 }

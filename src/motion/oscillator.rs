@@ -2,8 +2,8 @@
 
 use super::jet::Jet;
 use super::sines::{FrequencyBin, SineSum, SpectralLine, linear_bins};
-use crate::random::Stream;
 use std::f64::consts::TAU;
+use zsim_base::random::Stream;
 
 /// Sinusoids in a band-limited noise: with random frequencies, six do not repeat visibly within a run.
 const TERMS: usize = 6;
@@ -74,8 +74,8 @@ impl Oscillator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
     use approx::assert_relative_eq;
+    use zsim_base::random::Seed;
 
     #[test]
     fn band_limited_noise_has_unit_variance_and_stays_in_its_band() {

@@ -8,14 +8,14 @@ use super::jet::{Jet, PoseJet};
 use super::smooth::SmoothPath;
 use super::stand::start_on_route;
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Pose, Rotation, Route, Trajectory, Vector, from_roll_pitch_yaw};
-use crate::recording::{Reader, read_tum};
-use crate::spec::checked::{NonNegative, Positive};
-use crate::spec::{Source, SpecError};
-use crate::time::Stamp;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Route, Trajectory, Vector, from_roll_pitch_yaw};
+use zsim_base::spec::checked::{NonNegative, Positive};
+use zsim_base::spec::{Source, SpecError};
+use zsim_base::time::Stamp;
+use zsim_recording::{Reader, read_tum};
 
 /// A recorded trajectory that the base follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -124,7 +124,7 @@ impl PosesSpec {
                 let stamped = rows.iter().map(|(t_s, position_m, degrees)| {
                     let [roll, pitch, yaw] = degrees.map(f64::to_radians);
                     let rotation = from_roll_pitch_yaw(roll, pitch, yaw);
-                    let nanos = crate::time::Span::from_seconds(*t_s).nanos();
+                    let nanos = zsim_base::time::Span::from_seconds(*t_s).nanos();
                     (Stamp::from_nanos(nanos), Pose::from_parts(Vector::from(*position_m).into(), rotation))
                 });
                 if let Some(bad) = rows.iter().position(|row| !row.0.is_finite()) {

@@ -2,8 +2,8 @@
 
 use super::jet::Jet;
 use super::smooth::{SmoothPath, SmoothSteps};
-use crate::geometry::Vector;
-use crate::spec::{Source, SpecError};
+use zsim_base::geometry::Vector;
+use zsim_base::spec::{Source, SpecError};
 
 /// Half of the time in which the walker stops or sets off, s: a stop from 1 m/s in 1.5 s.
 const HALF_S: f64 = 0.75;

@@ -5,14 +5,14 @@ use super::sines::{FrequencyBin, SineSum, SpectralLine, linear_bins};
 use super::smooth::SmoothSteps;
 use super::stand::start_on_route;
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Route, Vector};
-use crate::random::{Seed, Stream};
-use crate::spec::checked::{Finite, NonNegative, Positive};
-use crate::spec::{Source, SpecError};
 use nalgebra::Complex;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
+use zsim_base::geometry::{Kinematics, Route, Vector};
+use zsim_base::random::{Seed, Stream};
+use zsim_base::spec::checked::{Finite, NonNegative, Positive};
+use zsim_base::spec::{Source, SpecError};
 
 /// A base that a shaker drives along or about an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

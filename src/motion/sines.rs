@@ -2,10 +2,10 @@
 
 use super::jet::Jet;
 use super::phasor::sin_cos_turns;
-use crate::random::Stream;
 use nalgebra::Complex;
 use rand::RngExt;
 use std::f64::consts::TAU;
+use zsim_base::random::Stream;
 
 /// One frequency of a sum with `N` outputs.
 #[derive(Debug, Clone)]
@@ -123,8 +123,8 @@ fn random_phase(stream: &mut Stream) -> Complex<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
     use approx::assert_relative_eq;
+    use zsim_base::random::Seed;
 
     #[test]
     fn a_line_is_its_cosine() {

@@ -5,7 +5,7 @@
 //! interval. A path of straight segments, and a level that changes in steps, get three continuous derivatives.
 
 use super::jet::Jet;
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Maximum of the kernel, at the centre. The peak rate of a smoothed unit step is this divided by the half-width.
 pub(super) const PEAK: f64 = 35.0 / 32.0;

@@ -8,11 +8,11 @@ use super::stand::{Stand, StandSpec};
 use super::uav::{Uav, UavSpec};
 use super::vehicle::{Vehicle, VehicleSpec};
 use super::{BaseMotion, MAX_DURATION_S, MotionError};
-use crate::geometry::Route;
-use crate::random::Seed;
-use crate::spec::{Kind, Source, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use zsim_base::geometry::Route;
+use zsim_base::random::Seed;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find, parse};
 
 /// Motion of the base, as written in a file of `specs/motions/`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -87,4 +87,9 @@ impl MotionSpec {
             MotionSpec::Hand(spec) => Box::new(Hand::new(spec, source, route, duration_s, seed)?),
         })
     }
+}
+
+impl NamedSpec for MotionSpec {
+    const KIND: Kind = Kind::Motion;
+    type Error = SpecError;
 }

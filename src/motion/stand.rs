@@ -2,15 +2,15 @@
 
 use super::BaseMotion;
 use super::jet::PoseJet;
-use crate::geometry::{Kinematics, Route, Vector};
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::{Kinematics, Route, Vector};
 
 /// A stationary base at the start of the route, facing along it; without a route, at the origin of the world, facing x.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StandSpec {
     /// Height of the base above the floor, m.
-    #[serde(with = "crate::spec::checked::Finite")]
+    #[serde(with = "zsim_base::spec::checked::Finite")]
     pub height_m: f64,
 }
 

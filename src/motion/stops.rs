@@ -1,10 +1,10 @@
 //! Stops: intervals in which the hand grips the head while the walk continues.
 
 use super::smooth::SmoothSteps;
-use crate::random::Stream;
-use crate::spec::{Source, SpecError};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
+use zsim_base::random::Stream;
+use zsim_base::spec::{Source, SpecError};
 
 /// When the hand grips the head. The rest of the motion continues.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -16,13 +16,13 @@ pub enum StopsSpec {
     Random {
         /// Mean time from the end of a stop to the start of the next, s; uniformly distributed from 0.5 to 1.5 times this
         /// value.
-        #[serde(with = "crate::spec::checked::Positive")]
+        #[serde(with = "zsim_base::spec::checked::Positive")]
         every_s: f64,
         /// Shortest stop, s.
-        #[serde(with = "crate::spec::checked::Positive")]
+        #[serde(with = "zsim_base::spec::checked::Positive")]
         shortest_s: f64,
         /// Longest stop, s.
-        #[serde(with = "crate::spec::checked::Positive")]
+        #[serde(with = "zsim_base::spec::checked::Positive")]
         longest_s: f64,
     },
 }

@@ -2,10 +2,10 @@
 
 use super::MotionError;
 use super::smooth::{PEAK, SmoothPath, SmoothSteps};
-use crate::geometry::{Route, Vector};
-use crate::spec::{Source, SpecError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use zsim_base::geometry::{Route, Vector};
+use zsim_base::spec::{Source, SpecError};
 
 /// How a walker or a vehicle follows a route.
 ///
@@ -16,26 +16,26 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 #[serde(deny_unknown_fields)]
 pub struct WalkSpec {
     /// Speed on straight legs, m/s.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub speed_m_per_s: f64,
     /// Speed at a corner of 90 degrees or more, m/s. At a smaller corner the speed is interpolated linearly in the
     /// angle.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub corner_speed_m_per_s: f64,
     /// Distance before and after a corner over which the speed is reduced, m.
-    #[serde(with = "crate::spec::checked::NonNegative")]
+    #[serde(with = "zsim_base::spec::checked::NonNegative")]
     pub corner_reach_m: f64,
     /// Half-width of the smoothing kernel, s. A larger value cuts corners more and accelerates more gently.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub smoothing_s: f64,
     /// Minimum half-width of a turn in heading, s.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub turn_s: f64,
     /// Maximum turn rate, degrees/s. A larger turn takes longer.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub turn_rate_deg_per_s: f64,
     /// Delay of the turn in heading after the turn of the path, s.
-    #[serde(with = "crate::spec::checked::Finite")]
+    #[serde(with = "zsim_base::spec::checked::Finite")]
     pub turn_lag_s: f64,
 }
 

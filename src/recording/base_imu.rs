@@ -1,12 +1,12 @@
 //! Reads the IMU on the base, for the estimate of the base's motion.
 
-use crate::geometry::Pose;
-use crate::measurement::ImuSample;
-use crate::recording::message::imu;
-use crate::recording::schema::MessageType;
-use crate::recording::selection::probe_imu;
-use crate::recording::topics::{BASE, Topic};
-use crate::recording::{Loss, Reader, RecordingError};
+use crate::message::imu;
+use crate::schema::MessageType;
+use crate::selection::probe_imu;
+use crate::topics::{BASE, Topic};
+use crate::{Loss, Reader, RecordingError};
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::ImuSample;
 
 /// Data of the IMU on the base.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-use crate::time::Stamp;
+use zsim_base::time::Stamp;
 
 /// Point of a point cloud.
 #[derive(Debug, Clone, Copy, PartialEq)]

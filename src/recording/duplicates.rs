@@ -1,7 +1,7 @@
 //! Removes duplicate messages: merged bags, and drivers that publish a scan twice.
 
-use crate::measurement::{ImuSample, LidarScan, Measurement};
-use crate::time::Stamp;
+use zsim_base::measurement::{ImuSample, LidarScan, Measurement};
+use zsim_base::time::Stamp;
 
 /// Minimum number of returns of a scan for equality to be significant.
 const MIN_RETURNS: usize = 100;

@@ -1,5 +1,5 @@
-use crate::geometry::TrajectoryError;
 use std::path::PathBuf;
+use zsim_base::geometry::TrajectoryError;
 
 /// Error of reading or writing a recording, a trajectory, a point cloud or a surfel map.
 #[derive(Debug, thiserror::Error)]

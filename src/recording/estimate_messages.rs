@@ -1,14 +1,14 @@
 //! Messages that publish an estimate while it is computed.
 
-use crate::geometry::{Kinematics, Pose, PoseCovariance};
-use crate::recording::message::transforms::Transform;
-use crate::recording::message::{diagnostics, points, pose, transforms};
-use crate::recording::topics::MAP;
-use crate::recording::wire::Encoder;
-use crate::recording::{CloudPoint, RecordingError};
-use crate::time::Stamp;
+use crate::message::transforms::Transform;
+use crate::message::{diagnostics, points, pose, transforms};
+use crate::topics::MAP;
+use crate::wire::Encoder;
+use crate::{CloudPoint, RecordingError};
+use zsim_base::geometry::{Kinematics, Pose, PoseCovariance};
+use zsim_base::time::Stamp;
 
-pub use crate::recording::message::diagnostics::{Diagnostic, DiagnosticLevel};
+pub use crate::message::diagnostics::{Diagnostic, DiagnosticLevel};
 
 /// Topic of a published estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

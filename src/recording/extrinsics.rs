@@ -1,13 +1,13 @@
 //! Reads the extrinsics of a recording's sensors from `/tf_static`.
 
-use crate::geometry::Pose;
-use crate::measurement::Calibration;
-use crate::recording::container::{ChannelId, Messages};
-use crate::recording::message::transforms::{self, Transform};
-use crate::recording::schema::MessageType;
-use crate::recording::topics::HEAD;
-use crate::recording::{Reader, RecordingError, Selection};
+use crate::container::{ChannelId, Messages};
+use crate::message::transforms::{self, Transform};
+use crate::schema::MessageType;
+use crate::topics::HEAD;
+use crate::{Reader, RecordingError, Selection};
 use std::collections::BTreeMap;
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::Calibration;
 
 /// Calibration, and the origin of the poses.
 #[derive(Debug, Clone, PartialEq)]

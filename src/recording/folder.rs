@@ -1,6 +1,6 @@
 //! Files of a recording that is a folder, as rosbag2 writes them.
 
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use serde::Deserialize;
 use std::ffi::OsStr;
 use std::io::{Error, Read};
@@ -94,10 +94,7 @@ fn find_listed_file(folder: &Path, name: &str) -> Result<PathBuf, RecordingError
     let decompressed = decompressed.map(|file| file.with_extension(""));
     [decompressed, file].into_iter().flatten().find(|file| file.is_file()).ok_or_else(|| RecordingError::Folder {
         path: folder.to_owned(),
-        problem: format!(
-            "lacks the file `{}`, which its {METADATA_FILE} lists",
-            crate::recording::topics::printable(name)
-        ),
+        problem: format!("lacks the file `{}`, which its {METADATA_FILE} lists", crate::topics::printable(name)),
     })
 }
 

@@ -1,11 +1,11 @@
 //! Measurements from messages that arrive one after another, as on a running robot.
 
-use crate::measurement::Measurement;
-use crate::recording::duplicates::DuplicateFilter;
-use crate::recording::measurements::{MeasurementDecoder, Role};
-use crate::recording::stamp_sorter::StampSorter;
-use crate::recording::wire::{Payload, WireFormat};
-use crate::recording::{Loss, Selection};
+use crate::duplicates::DuplicateFilter;
+use crate::measurements::{MeasurementDecoder, Role};
+use crate::stamp_sorter::StampSorter;
+use crate::wire::{Payload, WireFormat};
+use crate::{Loss, Selection};
+use zsim_base::measurement::Measurement;
 
 /// Decodes the messages of the selected sensors as they arrive.
 ///

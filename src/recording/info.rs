@@ -5,16 +5,16 @@ mod intervals;
 
 pub use clock::ClockStatistics;
 
-use crate::recording::container::{Channel, ChannelId, RawMessage};
-use crate::recording::schema::MessageType;
-use crate::recording::wire::Decoder;
-use crate::recording::{Loss, Reader, RecordingError};
-use crate::signal::StampPattern;
-use crate::time::{Span, Stamp};
+use crate::container::{Channel, ChannelId, RawMessage};
+use crate::schema::MessageType;
+use crate::wire::Decoder;
+use crate::{Loss, Reader, RecordingError};
 use clock::ClockFit;
 use intervals::Intervals;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use zsim_base::signal::StampPattern;
+use zsim_base::time::{Span, Stamp};
 
 /// Summary of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]

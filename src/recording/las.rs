@@ -2,12 +2,12 @@
 //!
 //! Point format 6 (ASPRS LAS specification 1.4 R15), with the error in extra bytes.
 
-use crate::recording::{CloudPoint, RecordingError};
-use crate::time::Stamp;
+use crate::{CloudPoint, RecordingError};
 use las::point::Format;
 use las::{Builder, Point, Transform, Vector, Vlr};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::sync::{Arc, OnceLock};
+use zsim_base::time::Stamp;
 
 /// Resolution of the coordinates, m.
 const RESOLUTION_M: f64 = 1e-4;

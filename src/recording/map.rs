@@ -3,12 +3,12 @@
 //! `docs/guide/maps.md` documents the format.
 
 use super::ply::header::{self, Header, PlyFormat, Problem, Property, Scalar};
-use crate::geometry::{Matrix, Vector};
-use crate::recording::RecordingError;
-use crate::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
+use crate::RecordingError;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
+use zsim_base::geometry::{Matrix, Vector};
+use zsim_base::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
 
 /// Version of the file format.
 const VERSION: u32 = 1;

@@ -4,10 +4,9 @@
 //! killed process loses the batches in flight and nothing before them. At most [`BATCHES`] batches exist, so memory
 //! does not grow with the recording. The bytes written do not depend on thread scheduling.
 
-use crate::recording::RecordingError;
-use crate::recording::topics::Topic;
-use crate::recording::wire::Encoder;
-use crate::time::Stamp;
+use crate::RecordingError;
+use crate::topics::Topic;
+use crate::wire::Encoder;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use std::collections::BTreeMap;
@@ -15,6 +14,7 @@ use std::io::{BufWriter, Error, Write};
 use std::ops::Range;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
+use zsim_base::time::Stamp;
 
 /// Bytes of messages per chunk: more compress slightly better, fewer lose less if the process is killed.
 pub const CHUNK_BYTES: usize = 1 << 20;

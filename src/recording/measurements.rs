@@ -1,15 +1,15 @@
 //! Reads a recording's measurements sequentially, without ground truth.
 
-use crate::measurement::{ImuSample, LidarScan, Measurement};
-use crate::recording::container::{ChannelId, Messages};
-use crate::recording::duplicates::DuplicateFilter;
-use crate::recording::message::scan::Projector;
-use crate::recording::message::{imu, livox, multi_echo, points, scan};
-use crate::recording::pairing::ImuPairing;
-use crate::recording::selection::{ImuDecoding, ImuLayout, LidarDecoding, LidarKind};
-use crate::recording::stamp_sorter::StampSorter;
-use crate::recording::wire::{DecodeError, Payload};
-use crate::recording::{Loss, Reader, RecordingError, Selection};
+use crate::container::{ChannelId, Messages};
+use crate::duplicates::DuplicateFilter;
+use crate::message::scan::Projector;
+use crate::message::{imu, livox, multi_echo, points, scan};
+use crate::pairing::ImuPairing;
+use crate::selection::{ImuDecoding, ImuLayout, LidarDecoding, LidarKind};
+use crate::stamp_sorter::StampSorter;
+use crate::wire::{DecodeError, Payload};
+use crate::{Loss, Reader, RecordingError, Selection};
+use zsim_base::measurement::{ImuSample, LidarScan, Measurement};
 
 /// Reads measurements in order of their stamps, independent of log times.
 ///

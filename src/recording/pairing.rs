@@ -1,9 +1,9 @@
 //! Combines angular velocities and accelerations from separate messages into IMU samples.
 
-use crate::geometry::Vector;
-use crate::measurement::ImuSample;
-use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::{Span, Stamp};
 
 /// Maximum number of queued messages of each kind: bounds the memory if the other kind stops.
 const MAX_QUEUE: usize = 20_000;

@@ -1,11 +1,11 @@
 //! The messages of a recording as they were written, for whoever publishes them again.
 
-use crate::recording::container::ChannelId;
-use crate::recording::wire::WireFormat;
-use crate::recording::{Loss, Reader, RecordingError};
-use crate::time::Stamp;
+use crate::container::ChannelId;
+use crate::wire::WireFormat;
+use crate::{Loss, Reader, RecordingError};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use zsim_base::time::Stamp;
 
 /// Serialisation of the messages of ROS 2.
 const CDR: &str = "cdr";

@@ -12,9 +12,9 @@ pub use writer::PlyWriter;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::CloudPoint;
-    use crate::time::Stamp;
+    use crate::CloudPoint;
     use std::io::Cursor;
+    use zsim_base::time::Stamp;
 
     fn point(k: i64) -> CloudPoint {
         CloudPoint {

@@ -1,11 +1,11 @@
 //! Reads all poses of one topic.
 
-use crate::geometry::Trajectory;
-use crate::recording::container::Channel;
-use crate::recording::message::pose;
-use crate::recording::schema::MessageType;
-use crate::recording::topics::Topic;
-use crate::recording::{Reader, RecordingError};
+use crate::container::Channel;
+use crate::message::pose;
+use crate::schema::MessageType;
+use crate::topics::Topic;
+use crate::{Reader, RecordingError};
+use zsim_base::geometry::Trajectory;
 
 /// Message types with a pose that are supported.
 const POSE_TYPES: [MessageType; 2] = [MessageType::Odometry, MessageType::PoseStamped];

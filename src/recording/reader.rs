@@ -1,11 +1,11 @@
 //! Opens a recording for reading, written by zsim or by another program.
 
-use crate::recording::container::{Block, Channel, ChannelId, Messages, RawMessage, RecordingFile};
-use crate::recording::folder::list_files;
-use crate::recording::{Loss, RecordingError};
-use crate::time::Stamp;
+use crate::container::{Block, Channel, ChannelId, Messages, RawMessage, RecordingFile};
+use crate::folder::list_files;
+use crate::{Loss, RecordingError};
 use std::io::{Read, Seek};
 use std::path::Path;
+use zsim_base::time::Stamp;
 
 /// A recording: an MCAP file, a ROS 1 bag, a rosbag2 database, or several of these from a split recording.
 ///

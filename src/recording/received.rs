@@ -1,13 +1,13 @@
 //! Writes messages of any topic, as they were received, to an MCAP file.
 
-use crate::recording::RecordingError;
-use crate::recording::mcap_writer::CHUNK_BYTES;
-use crate::recording::schema::MessageType;
-use crate::time::Stamp;
+use crate::RecordingError;
+use crate::mcap_writer::CHUNK_BYTES;
+use crate::schema::MessageType;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
+use zsim_base::time::Stamp;
 
 /// Zstd level, as of simulated recordings.
 const ZSTD_LEVEL: u32 = 1;

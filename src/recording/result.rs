@@ -1,14 +1,14 @@
 //! Writes an estimate as a recording for viewers: pose of the head, path, and point cloud.
 
-use crate::geometry::{Pose, PoseCovariance, Trajectory};
-use crate::recording::mcap_writer::McapWriter;
-use crate::recording::message::transforms::Transform;
-use crate::recording::message::{points, pose, transforms};
-use crate::recording::topics::{MAP, Topic};
-use crate::recording::{CloudPoint, RecordingError};
-use crate::time::{Span, Stamp};
+use crate::mcap_writer::McapWriter;
+use crate::message::transforms::Transform;
+use crate::message::{points, pose, transforms};
+use crate::topics::{MAP, Topic};
+use crate::{CloudPoint, RecordingError};
 use std::collections::BTreeMap;
 use std::path::Path;
+use zsim_base::geometry::{Pose, PoseCovariance, Trajectory};
+use zsim_base::time::{Span, Stamp};
 
 /// Interval between poses of `/path`.
 const PATH_PERIOD: Span = Span::from_nanos(100_000_000);

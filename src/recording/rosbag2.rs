@@ -1,10 +1,10 @@
 //! Writes the metadata that makes a recording of zsim a folder of rosbag2.
 
-use crate::recording::folder::METADATA_FILE;
-use crate::recording::topics::Topic;
-use crate::recording::{Reader, RecordingError, TopicInfo};
-use crate::time::Span;
+use crate::folder::METADATA_FILE;
+use crate::topics::Topic;
+use crate::{Reader, RecordingError, TopicInfo};
 use std::path::{Path, PathBuf};
+use zsim_base::time::Span;
 
 /// Version of the format: that of ROS 2 Humble, which later distributions read too.
 const VERSION: u32 = 5;

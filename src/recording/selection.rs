@@ -6,14 +6,14 @@ mod content;
 mod imu_choice;
 mod preview;
 
-use crate::recording::message::no_returns::NoReturnDetector;
-use crate::recording::message::{imu, multi_echo, points, scan};
-use crate::recording::schema::MessageType;
-use crate::recording::{Reader, RecordingError};
-use crate::time::Span;
+use crate::message::no_returns::NoReturnDetector;
+use crate::message::{imu, multi_echo, points, scan};
+use crate::schema::MessageType;
+use crate::{Reader, RecordingError};
 use candidates::BeamTimes;
 pub(super) use candidates::{Candidate, LidarKind, probe_imu};
 pub(super) use imu_choice::ImuLayout;
+use zsim_base::time::Span;
 
 /// Topics that the caller requests; topics not given are detected.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! Sorts the measurements of two sensors by stamp, independent of log times.
 
-use crate::measurement::Measurement;
-use crate::time::Stamp;
 use std::collections::VecDeque;
+use zsim_base::measurement::Measurement;
+use zsim_base::time::Stamp;
 
 /// Maximum disorder within one sensor that is corrected, s.
 const MAX_DISORDER_S: f64 = 0.5;
@@ -54,9 +54,9 @@ fn span_s(queue: &VecDeque<Measurement>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::measurement::{ImuSample, LidarScan};
-    use crate::time::Span;
+    use zsim_base::geometry::Vector;
+    use zsim_base::measurement::{ImuSample, LidarScan};
+    use zsim_base::time::Span;
 
     fn at(ms: i64) -> Stamp {
         Stamp::from_nanos(ms * 1_000_000)

@@ -1,6 +1,6 @@
 //! Topics and frames of recordings that zsim writes.
 
-use crate::recording::schema::MessageType;
+use crate::schema::MessageType;
 
 /// Frame of the lidar.
 pub const LASER: &str = "laser";

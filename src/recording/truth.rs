@@ -1,12 +1,12 @@
 //! Reads the ground truth of a recording: for evaluation only, never for the estimator.
 
-use crate::geometry::{Pose, Trajectory};
-use crate::recording::container::{ChannelId, Messages, RawMessage};
-use crate::recording::message::{clock, pose};
-use crate::recording::topics::Topic;
-use crate::recording::{Loss, Reader, RecordingError};
-use crate::time::Stamp;
-use crate::truth::ClockTruth;
+use crate::container::{ChannelId, Messages, RawMessage};
+use crate::message::{clock, pose};
+use crate::topics::Topic;
+use crate::{Loss, Reader, RecordingError};
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::time::Stamp;
+use zsim_truth::ClockTruth;
 
 /// One item of ground truth.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,14 +2,14 @@
 
 mod number;
 
-use crate::geometry::{Pose, Rotation, Trajectory, Vector};
-use crate::measurement::SinkError;
-use crate::recording::RecordingError;
-use crate::time::Stamp;
-use crate::truth::{ClockTruth, TruthSample, TruthSink};
+use crate::RecordingError;
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Read, Write};
 use std::path::Path;
+use zsim_base::geometry::{Pose, Rotation, Trajectory, Vector};
+use zsim_base::measurement::SinkError;
+use zsim_base::time::Stamp;
+use zsim_truth::{ClockTruth, TruthSample, TruthSink};
 
 /// Maximum length of a line, bytes; a pose has about 100.
 const MAX_LINE_BYTES: u64 = 4096;
@@ -151,7 +151,7 @@ fn parse_line(line: &str) -> Result<(Stamp, Pose), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     #[test]
     fn a_written_trajectory_is_read_to_the_ninth_decimal() {

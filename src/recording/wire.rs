@@ -15,9 +15,9 @@ pub use encoder::Encoder;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::time::{NANOS_PER_SECOND, Stamp};
     use serde::Serialize;
+    use zsim_base::geometry::Vector;
+    use zsim_base::time::{NANOS_PER_SECOND, Stamp};
 
     #[derive(Serialize)]
     struct Mixed {

@@ -1,19 +1,19 @@
 //! Writes the recording of a simulated run.
 
-use crate::geometry::{Pose, PoseCovariance};
-use crate::measurement::{Calibration, ImuNoise, ImuSample, LidarScan, Sink, SinkError};
-use crate::recording::RecordingError;
-use crate::recording::mcap_writer::McapWriter;
-use crate::recording::message::clock::{self, ClockReading};
-use crate::recording::message::imu::Variances;
-use crate::recording::message::transforms::Transform;
-use crate::recording::message::{imu, points, pose, scan, transforms};
-use crate::recording::topics::{self, Topic};
-use crate::time::{Span, Stamp};
-use crate::truth::{ClockTruth, TruthSample, TruthSink};
+use crate::RecordingError;
+use crate::mcap_writer::McapWriter;
+use crate::message::clock::{self, ClockReading};
+use crate::message::imu::Variances;
+use crate::message::transforms::Transform;
+use crate::message::{imu, points, pose, scan, transforms};
+use crate::topics::{self, Topic};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
+use zsim_base::geometry::{Pose, PoseCovariance};
+use zsim_base::measurement::{Calibration, ImuNoise, ImuSample, LidarScan, Sink, SinkError};
+use zsim_base::time::{Span, Stamp};
+use zsim_truth::{ClockTruth, TruthSample, TruthSink};
 
 /// Interval between messages of `/ground_truth/odom` and `/tf`: 100 Hz.
 const ODOMETRY_PERIOD: Span = Span::from_nanos(10_000_000);

@@ -4,10 +4,10 @@ use super::figures::LengthUnit;
 use super::plot::{Chart, Colour, Figure, Mark, Series};
 use super::quantity::{length, percent};
 use super::table::table;
-use crate::evaluation::{Errors, RelativeError, TrajectoryErrors};
-use crate::geometry::{Trajectory, Vector};
-use crate::time::Stamp;
 use serde_json::{Map, Value, json};
+use zsim_base::geometry::{Trajectory, Vector};
+use zsim_base::time::Stamp;
+use zsim_evaluation::{Errors, RelativeError, TrajectoryErrors};
 
 const TIME: &str = "Time (s)";
 

@@ -1,9 +1,9 @@
 //! Plots of a run.
 
 use super::plot::{Chart, Colour, Figure, Mark, Series};
-use crate::evaluation::{Errors, InformationBound};
-use crate::geometry::{Rotation, Trajectory, Vector};
-use crate::time::Stamp;
+use zsim_base::geometry::{Rotation, Trajectory, Vector};
+use zsim_base::time::Stamp;
+use zsim_evaluation::{Errors, InformationBound};
 
 const TIME: &str = "Time (s)";
 /// Duration of the enlarged section of the pitch plot, s: several periods of the rocking mode.

@@ -1,6 +1,6 @@
 //! Names of quantities for plots and tables, from the keys of specs.
 
-use crate::spec::split_unit;
+use zsim_base::spec::split_unit;
 
 /// Keys with another name than their own words. The unit follows from the key.
 const NAMES: [(&str, &str); 15] = [

@@ -2,7 +2,7 @@
 
 use super::quantity::{percent, time};
 use super::table;
-use crate::estimation::Timing;
+use zsim_estimation::Timing;
 
 /// A table of the time of each part of the estimator, and its percentage of the open loop's `wall_s`.
 ///

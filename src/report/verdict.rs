@@ -17,7 +17,7 @@ pub(super) fn verdict(metrics: &Metrics) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{CauseMetrics, IntegrityMetrics};
+    use crate::{CauseMetrics, IntegrityMetrics};
 
     fn with_status(status: &str, causes: Vec<CauseMetrics>) -> Metrics {
         let integrity = IntegrityMetrics { bound_m_99: Some(0.0062), causes, ..IntegrityMetrics::default() };

@@ -1,6 +1,6 @@
 use super::{CanopyPart, Scenery, SurfaceHit, Track};
-use crate::geometry::{Pose, Vector};
-use crate::world::{Ray, TimedRay};
+use zsim_base::geometry::{Pose, Vector};
+use zsim_world::{Ray, TimedRay};
 
 /// An upright cylinder with closed ends, fixed in the base frame: an operator's body, a handle, the mast of a cart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -186,9 +186,9 @@ impl Scenery for SceneryWithCarrier<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Kinematics, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
     use std::f64::consts::FRAC_PI_2;
+    use zsim_base::geometry::{Kinematics, from_roll_pitch_yaw};
 
     /// A wall across the world's x axis.
     struct Wall(f64);

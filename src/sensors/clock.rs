@@ -1,6 +1,6 @@
-use crate::spec::{Source, SpecError, checked};
-use crate::time::{Span, Stamp};
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked};
+use zsim_base::time::{Span, Stamp};
 
 /// Clocks of the sensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -160,10 +160,15 @@ impl Clock {
     }
 }
 
+impl NamedSpec for ClocksSpec {
+    const KIND: Kind = Kind::Clock;
+    type Error = SpecError;
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Kind, find, parse};
+    use zsim_base::spec::{Kind, find, parse};
 
     fn clock(offset_ms: f64, rate_ppm: f64, resolution_ms: f64) -> Clock {
         let spec = ClockSpec { offset_ms, rate_ppm, jitter_ms: 0.0, resolution_ms };
@@ -209,7 +214,7 @@ mod tests {
 
     #[test]
     fn every_built_in_clock_loads() {
-        let names = crate::spec::names(Kind::Clock);
+        let names = zsim_base::spec::names(Kind::Clock);
         assert!(names.contains(&"drifting".to_owned()), "{names:?}");
         for name in names {
             let source = find(Kind::Clock, &name).unwrap();

@@ -1,5 +1,5 @@
-use crate::geometry::Vector;
-use crate::world::{Hit, Ray, TimedRay, World};
+use zsim_base::geometry::Vector;
+use zsim_world::{Hit, Ray, TimedRay, World};
 
 /// Intersection of a ray with a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,9 @@
 use super::Clock;
-use crate::random::Stream;
-use crate::time::{Span, Stamp};
 use rand_distr::{Distribution, StandardNormal};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use zsim_base::random::Stream;
+use zsim_base::time::{Span, Stamp};
 
 /// Jitter is limited to this many standard deviations: it affects 6 stamps in 10 million.
 const MAX_JITTER_SIGMAS: f64 = 5.0;
@@ -67,9 +67,9 @@ impl Iterator for Stamper {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
-    use crate::sensors::ClockSpec;
-    use crate::spec::Source;
+    use crate::ClockSpec;
+    use zsim_base::random::Seed;
+    use zsim_base::spec::Source;
 
     fn errors_s(jitter_ms: f64, resolution_ms: f64, period_s: f64, count: usize) -> Vec<f64> {
         let spec = ClockSpec { offset_ms: 0.0, rate_ppm: 0.0, jitter_ms, resolution_ms };

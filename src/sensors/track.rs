@@ -1,5 +1,5 @@
-use crate::geometry::{Kinematics, Pose, Rotation, Vector};
 use nalgebra::{Quaternion, Unit};
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector};
 
 /// Motion of a frame over an interval: kinematics at evenly spaced nodes, interpolated between them.
 ///
@@ -157,8 +157,8 @@ fn small_rotation(turn: &Vector) -> Rotation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     /// A body that rotates about y and moves along y, both as sinusoids at 2 Hz.
     fn nodding(t_s: f64) -> Kinematics {

@@ -2,9 +2,9 @@
 
 use super::SimulationError;
 use super::measure::Events;
-use crate::measurement::Sink;
-use crate::time::Stamp;
-use crate::truth::TruthSink;
+use zsim_base::measurement::Sink;
+use zsim_base::time::Stamp;
+use zsim_truth::TruthSink;
 
 /// Delivers all events. At equal times the order is: truth, clocks, IMUs, lidar.
 pub(super) fn deliver<S: Sink + TruthSink + ?Sized>(events: &Events, sink: &mut S) -> Result<(), SimulationError> {

@@ -1,8 +1,8 @@
-use crate::dynamics::DynamicsError;
-use crate::measurement::SinkError;
-use crate::motion::MotionError;
-use crate::spec::SpecError;
-use crate::world::WorldError;
+use zsim_base::measurement::SinkError;
+use zsim_base::spec::SpecError;
+use zsim_dynamics::DynamicsError;
+use zsim_motion::MotionError;
+use zsim_world::WorldError;
 
 /// Why a simulation cannot start or continue.
 #[derive(Debug, thiserror::Error)]

@@ -3,14 +3,14 @@
 use super::motion::{MotionChunk, STEP_S};
 use super::schedule::{ImuInterval, ImuSchedule, Schedule};
 use super::{Outputs, Rig, SimulationSummary};
-use crate::geometry::{Pose, Vector};
-use crate::measurement::{ImuNoise, ImuSample, LidarScan};
-use crate::random::Seed;
-use crate::sensors::{Clock, Imu, ImuSampler, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track};
-use crate::time::{Span, Stamp};
-use crate::truth::{ClockTruth, TruthSample};
 use rayon::prelude::*;
 use std::time::Instant;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::measurement::{ImuNoise, ImuSample, LidarScan};
+use zsim_base::random::Seed;
+use zsim_base::time::{Span, Stamp};
+use zsim_sensors::{Clock, Imu, ImuSampler, LidarErrors, ScanTiming, Scenery, SceneryWithCarrier, Track};
+use zsim_truth::{ClockTruth, TruthSample};
 
 /// All events of a motion chunk with their true time, each kind in order of time.
 #[derive(Debug, Default)]

@@ -1,14 +1,14 @@
 //! Motion of head and base, in chunks.
 
 use super::SimulationError;
-use crate::dynamics::{DynamicsError, HeadState};
-use crate::geometry::Kinematics;
 use std::collections::VecDeque;
+use zsim_base::geometry::Kinematics;
+use zsim_dynamics::{DynamicsError, HeadState};
 
-/// Time step of a [`HeadMotion`], s: 1 ms resolves vibration up to 100 Hz (see [`Track`](crate::sensors::Track)).
+/// Time step of a [`HeadMotion`], s: 1 ms resolves vibration up to 100 Hz (see [`Track`](zsim_sensors::Track)).
 pub const STEP_S: f64 = 1e-3;
 
-/// States of the head at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](crate::dynamics::HeadSimulation) with
+/// States of the head at 0, [`STEP_S`], 2 [`STEP_S`], ...: a [`HeadSimulation`](zsim_dynamics::HeadSimulation) with
 /// this step, or another source.
 pub type HeadMotion<'a> = dyn Iterator<Item = Result<HeadState, DynamicsError>> + Send + 'a;
 

@@ -1,14 +1,14 @@
 use super::faults::Injector;
 use super::run::simulate_together;
 use super::{EPOCH, Faults, Outputs, Rig, Run, STEP_S, Scenario, SimulationError, SimulationSummary, simulate};
-use crate::dynamics::{CarrierSpec, ContactWatch, DynamicsError, HeadModel, HeadSimulation, HeadSpec, HeadState};
-use crate::geometry::{Route, Vector};
-use crate::measurement::{Calibration, Sink};
-use crate::motion::BaseMotion;
-use crate::sensors::{Clocks, Cylinder, Imu, Lidar};
-use crate::spec::SpecError;
-use crate::truth::TruthSink;
-use crate::world::World;
+use zsim_base::geometry::{Route, Vector};
+use zsim_base::measurement::{Calibration, Sink};
+use zsim_base::spec::SpecError;
+use zsim_dynamics::{CarrierSpec, ContactWatch, DynamicsError, HeadModel, HeadSimulation, HeadSpec, HeadState};
+use zsim_motion::BaseMotion;
+use zsim_sensors::{Clocks, Cylinder, Imu, Lidar};
+use zsim_truth::TruthSink;
+use zsim_world::World;
 
 /// A run with all models built.
 pub struct Simulation {

@@ -1,9 +1,9 @@
 use super::motion::STEP_S;
-use crate::geometry::Pose;
-use crate::measurement::Calibration;
-use crate::random::Seed;
-use crate::sensors::{Clocks, Cylinder, Imu, Lidar, Scenery};
-use crate::time::{NANOS_PER_SECOND, Span, Stamp};
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::Calibration;
+use zsim_base::random::Seed;
+use zsim_base::time::{NANOS_PER_SECOND, Span, Stamp};
+use zsim_sensors::{Clocks, Cylinder, Imu, Lidar, Scenery};
 
 /// Start of all runs in true time: 2012-10-01, the year of the paper, so that stamps look like those of real
 /// recordings.

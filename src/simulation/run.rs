@@ -4,9 +4,9 @@ use super::deliver::deliver;
 use super::measure::{Events, Sensors, measure};
 use super::motion::{HeadMotion, MotionChunk, MotionChunks, STEP_S};
 use super::{Rig, SimulationError, SimulationSummary};
-use crate::measurement::Sink;
-use crate::truth::TruthSink;
 use std::time::Instant;
+use zsim_base::measurement::Sink;
+use zsim_truth::TruthSink;
 
 /// Steps per chunk: 0.5 s.
 const CHUNK_STEPS: u64 = 500;

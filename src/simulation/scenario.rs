@@ -1,12 +1,12 @@
-use super::{FaultsSpec, Named, SimulationError};
-use crate::dynamics::HeadSpec;
-use crate::motion::MotionSpec;
-use crate::random::Seed;
-use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use crate::spec::checked;
-use crate::world::SceneSpec;
+use super::{FaultsSpec, SimulationError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use zsim_base::random::Seed;
+use zsim_base::spec::{Named, checked};
+use zsim_dynamics::HeadSpec;
+use zsim_motion::MotionSpec;
+use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use zsim_world::SceneSpec;
 
 /// What to simulate: specs by name. A name is a path, or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,9 +1,9 @@
 //! Sample times of all sensors, and the times at which ground truth is written.
 
 use super::Rig;
-use crate::random::Seed;
-use crate::sensors::{Clock, Imu, ScanTiming, Stamper};
-use crate::time::{Span, Stamp};
+use zsim_base::random::Seed;
+use zsim_base::time::{Span, Stamp};
+use zsim_sensors::{Clock, Imu, ScanTiming, Stamper};
 
 /// Ground truth is written at whole milliseconds of lidar time, so that poses estimated at such stamps have a match.
 const TRUTH_STEP: Span = Span::from_nanos(1_000_000);

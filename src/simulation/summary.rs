@@ -1,5 +1,5 @@
-use crate::dynamics::CoilContact;
 use serde::Serialize;
+use zsim_dynamics::CoilContact;
 
 /// Statistics of a simulation. Wall times are for information and are not part of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]

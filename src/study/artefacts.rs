@@ -6,14 +6,13 @@ use super::decimation::decimated;
 use super::page::RunResults;
 use super::register::{ProjectedBeam, SampledBeam};
 use super::result_files::METRICS;
-use crate::estimation::ReturnClass;
-use crate::geometry::{Pose, Trajectory, Vector};
-use crate::report;
-use crate::report::page::RunPage;
-use crate::report::plot::Figure;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
+use zsim_base::geometry::{Pose, Trajectory, Vector};
+use zsim_estimation::ReturnClass;
+use zsim_report::page::RunPage;
+use zsim_report::plot::Figure;
 
 /// Cell size of the outline in the top view, m; each occupied cell is one dot.
 const CELL_M: f64 = 0.05;
@@ -41,15 +40,15 @@ pub(super) fn plots(results: &RunResults, sample: &[SampledBeam], min_range_m: f
     let outline = outline(sample.iter().filter(is_wall), &world_from_map, &estimate);
     let plot = |name, figure: Figure| Plot { name, figure };
 
-    let mut plots = vec![plot("trajectory", report::trajectory_views(truth, &estimate, &outline))];
+    let mut plots = vec![plot("trajectory", zsim_report::trajectory_views(truth, &estimate, &outline))];
     if let Some(errors) = comparison.and_then(|found| found.errors.as_ref()).map(|errors| &errors.decimated) {
-        plots.push(plot("errors", report::errors_over_time(errors)));
-        plots.extend(open_errors.map(|open| plot("loops", report::open_and_closed_loop_errors(open, errors))));
+        plots.push(plot("errors", zsim_report::errors_over_time(errors)));
+        plots.extend(open_errors.map(|open| plot("loops", zsim_report::open_and_closed_loop_errors(open, errors))));
     }
-    plots.extend(bound.map(|bound| plot("bound", report::bound_over_time(bound))));
-    plots.push(plot("pitch", report::head_pitch(truth, &estimate)));
+    plots.extend(bound.map(|bound| plot("bound", zsim_report::bound_over_time(bound))));
+    plots.push(plot("pitch", zsim_report::head_pitch(truth, &estimate)));
     let true_offsets = results.truth.map_or(&[][..], |truth| &truth.clock_offsets);
-    plots.push(plot("clock", report::clock_offset(true_offsets, &run.clock_offsets)));
+    plots.push(plot("clock", zsim_report::clock_offset(true_offsets, &run.clock_offsets)));
     plots
 }
 

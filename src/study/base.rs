@@ -2,12 +2,12 @@
 
 use super::StudyError;
 use super::calibration::base_imu;
-use crate::dynamics::{DynamicsError, HeadModel};
-use crate::estimation::{BaseEstimate, BaseFix, BaseImu, EstimationError, EstimatorSpec, FixSigmas, load, smooth_base};
-use crate::geometry::{Pose, Rotation, Trajectory, Vector};
-use crate::measurement::ImuSample;
-use crate::recording::{BaseImuRecord, Reader};
-use crate::time::Stamp;
+use zsim_base::geometry::{Pose, Rotation, Trajectory, Vector};
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::Stamp;
+use zsim_dynamics::{DynamicsError, HeadModel};
+use zsim_estimation::{BaseEstimate, BaseFix, BaseImu, EstimationError, EstimatorSpec, FixSigmas, load, smooth_base};
+use zsim_recording::{BaseImuRecord, Reader};
 
 /// Minimum gap between base IMU samples that counts as missing time, s, and maximum total missing time, s.
 const SHORT_GAP_S: f64 = 1.0;

@@ -1,9 +1,9 @@
 //! The trajectory that an estimate results in.
 
 use super::comparison::Comparison;
-use crate::geometry::{PoseCovariance, Trajectory};
-use crate::measurement::LidarCorrection;
-use crate::time::Stamp;
+use zsim_base::geometry::{PoseCovariance, Trajectory};
+use zsim_base::measurement::LidarCorrection;
+use zsim_base::time::Stamp;
 
 /// The estimate for cloud, result and plots: the closed loop if it was computed, else the open loop.
 pub(super) struct BestEstimate<'a> {

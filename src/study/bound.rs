@@ -5,15 +5,15 @@ use super::sensor_models::RecordedSensors;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, Stage, StudyError};
-use crate::evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge};
-use crate::geometry::{Pose, Rotation, Vector};
-use crate::measurement::{Calibration, ImuSample, LidarReturn, LidarScan, Measurement};
-use crate::recording::{Reader, RecordingError, Selection, TopicPreference, Truth};
-use crate::sensors::ImuSpec;
-use crate::simulation::Run;
-use crate::time::{Span, Stamp};
-use crate::world::{Hit, PlaneMap, Ray, TimedRay, World};
 use rayon::prelude::*;
+use zsim_base::geometry::{Pose, Rotation, Vector};
+use zsim_base::measurement::{Calibration, ImuSample, LidarReturn, LidarScan, Measurement};
+use zsim_base::time::{Span, Stamp};
+use zsim_evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge};
+use zsim_recording::{Reader, RecordingError, Selection, TopicPreference, Truth};
+use zsim_sensors::ImuSpec;
+use zsim_simulation::Run;
+use zsim_world::{Hit, PlaneMap, Ray, TimedRay, World};
 
 /// Prior standard deviations of the clock offset, s, and the clock rate, s/s: wide, so that they carry no information.
 const CLOCK_PRIOR: (f64, f64) = (0.1, 1e-3);

@@ -1,7 +1,7 @@
 //! Counts of a sensor's messages, and of those that are missing.
 
-use crate::signal::{Regularity, StampPattern};
-use crate::time::Stamp;
+use zsim_base::signal::{Regularity, StampPattern};
+use zsim_base::time::Stamp;
 
 /// Number of stamps that determine the period.
 const PERIOD_STAMPS: usize = 1000;

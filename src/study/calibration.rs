@@ -3,13 +3,13 @@
 use super::recorded_manifest::RecordedManifest;
 use super::sensor_models::{GivenModels, ImuNoiseSpec, LidarNoiseSpec, RecordedSensors, SensorModels, unknown_imu};
 use super::{Manifest, StudyError};
-use crate::dynamics::PlacementSpec;
-use crate::geometry::Pose;
-use crate::measurement::{Calibration, ImuAveraging, ImuNoise};
-use crate::recording::{FoundCalibration, Reader, Selection};
-use crate::sensors::Imu;
-use crate::spec::SpecError;
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::{Calibration, ImuAveraging, ImuNoise};
+use zsim_base::spec::SpecError;
+use zsim_dynamics::PlacementSpec;
+use zsim_recording::{FoundCalibration, Reader, Selection};
+use zsim_sensors::Imu;
 
 /// Sensor calibration given by the user.
 ///

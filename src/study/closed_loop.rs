@@ -1,11 +1,11 @@
 //! The closed loop: global registration of the open-loop estimate.
 
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimationError, EstimatorSpec, LoopReport, RegistrationInput, register};
-use crate::geometry::{PoseCovariance, Trajectory};
-use crate::measurement::{Calibration, LidarCorrection};
-use crate::time::Stamp;
 use std::time::Instant;
+use zsim_base::geometry::{PoseCovariance, Trajectory};
+use zsim_base::measurement::{Calibration, LidarCorrection};
+use zsim_base::time::Stamp;
+use zsim_estimation::{EstimationError, EstimatorSpec, LoopReport, RegistrationInput, register};
 
 /// Result of the global registration.
 pub(super) struct ClosedLoopRun {

@@ -2,13 +2,13 @@
 
 use super::register::{ClassCounts, ProjectedBeam, RegisteredCloud, SampledBeam};
 use super::truth_cursor::TrueState;
-use crate::estimation::ReturnClass;
-use crate::evaluation::{CloudErrors, CloudSummary};
-use crate::geometry::{Pose, Surface, Vector};
-use crate::report::{CloudMetrics, FilterMetrics};
-use crate::sensors::Cylinder;
-use crate::world::World;
 use rayon::prelude::*;
+use zsim_base::geometry::{Pose, Surface, Vector};
+use zsim_estimation::ReturnClass;
+use zsim_evaluation::{CloudErrors, CloudSummary};
+use zsim_report::{CloudMetrics, FilterMetrics};
+use zsim_sensors::Cylinder;
+use zsim_world::World;
 
 /// Maximum distance from a point to the nearest surface, m.
 const MAX_DISTANCE_M: f64 = 1.0;
@@ -152,8 +152,8 @@ fn in_world(beam: &ProjectedBeam, world_from: &Pose) -> (Vector, Option<Vector>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Source, parse};
     use approx::assert_relative_eq;
+    use zsim_base::spec::{Source, parse};
 
     /// A floor of 20 m, and a box of 0.4 m by 0.4 m by 2 m that moves along y = 3 with x = t.
     fn world() -> World {

@@ -2,9 +2,9 @@
 
 use super::StudyError;
 use super::atomic_file::AtomicFile;
-use crate::recording::{CloudPoint, LasWriter, PlyWriter, RecordingError};
 use std::fs::File;
 use std::path::Path;
+use zsim_recording::{CloudPoint, LasWriter, PlyWriter, RecordingError};
 
 /// File formats of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

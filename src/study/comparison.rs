@@ -5,15 +5,15 @@ use super::closed_loop::ClosedLoopRun;
 use super::decimation::{decimated, decimated_errors};
 use super::open_loop::OpenLoopRun;
 use super::sampled_truth::SampledTruth;
-use crate::estimation::EstimatorSpec;
-use crate::evaluation::{
+use zsim_base::geometry::{Pose, PoseCovariance, Trajectory};
+use zsim_base::measurement::LidarCorrection;
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::EstimatorSpec;
+use zsim_evaluation::{
     Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, consistency, drift, relative_error,
 };
-use crate::geometry::{Pose, PoseCovariance, Trajectory};
-use crate::measurement::LidarCorrection;
-use crate::report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
-use crate::simulation::SimulationSummary;
-use crate::time::{Span, Stamp};
+use zsim_report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
+use zsim_simulation::SimulationSummary;
 
 /// Comparison of an estimate with the truth.
 pub(super) struct Comparison {

@@ -1,8 +1,8 @@
 //! Decimation of curves for plots.
 
-use crate::evaluation::Errors;
-use crate::geometry::{Pose, Trajectory};
-use crate::time::Stamp;
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::time::Stamp;
+use zsim_evaluation::Errors;
 
 /// Maximum number of points of a curve: about a dozen for each pixel of the plot's width.
 const MAX_PLOT_POINTS: usize = 50_000;

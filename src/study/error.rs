@@ -1,14 +1,15 @@
-use crate::dynamics::DynamicsError;
-use crate::estimation::EstimationError;
-use crate::evaluation::EvaluationError;
-use crate::motion::MotionError;
-use crate::recording::RecordingError;
-use crate::report::plot::PlotError;
-use crate::signal::SignalError;
-use crate::simulation::SimulationError;
-use crate::spec::SpecError;
 use parquet::errors::ParquetError;
 use std::path::{Path, PathBuf};
+use zsim_base::signal::SignalError;
+use zsim_base::spec::SpecError;
+use zsim_dynamics::DynamicsError;
+use zsim_estimation::EstimationError;
+use zsim_evaluation::EvaluationError;
+use zsim_motion::MotionError;
+use zsim_recording::RecordingError;
+use zsim_report::plot::PlotError;
+use zsim_simulation::SimulationError;
+use zsim_world::WorldError;
 
 /// Error of an experiment.
 #[derive(Debug, thiserror::Error)]
@@ -103,6 +104,12 @@ pub enum StudyError {
     /// The experiment was stopped.
     #[error("stopped; completed files can be read")]
     Stopped,
+}
+
+impl From<WorldError> for StudyError {
+    fn from(error: WorldError) -> Self {
+        SimulationError::from(error).into()
+    }
 }
 
 impl From<DynamicsError> for StudyError {

@@ -22,12 +22,12 @@ use super::sampled_truth::SampledTruth;
 use super::sensor_models::RecordedSensors;
 use super::viewer_files::write_for_result;
 use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
-use crate::estimation::{EstimatorSpec, Timing};
-use crate::evaluation::{Errors, MapKnowledge, Pairs};
-use crate::recording::{FoundCalibration, Reader, Selection, write_tum};
-use crate::report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
-use crate::simulation::carrier_of;
 use std::path::Path;
+use zsim_estimation::{EstimatorSpec, Timing};
+use zsim_evaluation::{Errors, MapKnowledge, Pairs};
+use zsim_recording::{FoundCalibration, Reader, Selection, write_tum};
+use zsim_report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
+use zsim_simulation::carrier_of;
 
 /// The frame of the true poses in recordings of zsim.
 const TRUE_FRAME: &str = "head";

@@ -1,8 +1,8 @@
 //! Losses and notes of a run: one entry for each kind, with count, first and last time, and the worst case.
 
-use crate::estimation::{Discarded, Warning, WarningKind};
-use crate::report::EventMetrics;
-use crate::time::Stamp;
+use zsim_base::time::Stamp;
+use zsim_estimation::{Discarded, Warning, WarningKind};
+use zsim_report::EventMetrics;
 
 /// Losses and notes of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -68,7 +68,7 @@ pub(super) fn is_loss(kind: &WarningKind) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Span;
+    use zsim_base::time::Span;
 
     #[test]
     fn each_kind_is_one_entry_with_count_first_time_and_worst_case() {

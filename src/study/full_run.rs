@@ -7,9 +7,9 @@ use super::result_files::{full_run_files, remove};
 use super::sensor_models::RecordedSensors;
 use super::viewer_files::ViewerFiles;
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, StudyError, record};
-use crate::recording::{Reader, TopicPreference};
-use crate::simulation::Simulation;
 use std::path::Path;
+use zsim_recording::{Reader, TopicPreference};
+use zsim_simulation::Simulation;
 
 /// Simulates, records, estimates, evaluates and reports, with all files in the existing `folder`.
 ///

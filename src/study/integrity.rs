@@ -4,16 +4,16 @@ use super::StudyError;
 use super::atomic_file::AtomicFile;
 use super::closed_loop::ClosedLoopRun;
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use zsim_base::geometry::{Pose, PoseCovariance, Trajectory, Vector};
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::{
     ALIGNMENT_S, Cause, Evidence, Finding, Status, TURN_LEVER_M, Warning, WarningKind, WindowReport, bound_factors,
     covariance_blocks, findings, radius_99,
 };
-use crate::evaluation::{Errors, Pairs, align_poses};
-use crate::geometry::{Pose, PoseCovariance, Trajectory, Vector};
-use crate::report::{CauseMetrics, IntegrityMetrics};
-use crate::time::{Span, Stamp};
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use zsim_evaluation::{Errors, Pairs, align_poses};
+use zsim_report::{CauseMetrics, IntegrityMetrics};
 
 /// Floor of the position bound, added in quadrature, m.
 const MIN_BOUND_M: f64 = 0.001;

@@ -3,12 +3,12 @@
 use super::StudyError;
 use super::calibration::CalibrationSpec;
 use super::sensor_models::ImuNoiseSpec;
-use crate::dynamics::PlacementSpec;
-use crate::geometry::{Pose, Rotation};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::path::Path;
+use zsim_base::geometry::{Pose, Rotation};
+use zsim_dynamics::PlacementSpec;
 
 /// Maximum deviation of a matrix element from a rigid transform: manually written files have 3 or 4 digits.
 const RIGID_TOLERANCE: f64 = 1e-3;
@@ -79,12 +79,12 @@ impl CalibrationSpec {
     /// # Errors
     /// When the file cannot be read, has an unknown key or an invalid value.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
-        let source = crate::spec::Source::read(path)?;
+        let source = zsim_base::spec::Source::read(path)?;
         let is_yaml = path.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");
         if is_yaml {
             Self::from_kalibr(&source.text, &path.display().to_string())
         } else {
-            Ok(crate::spec::parse(&source)?)
+            Ok(zsim_base::spec::parse(&source)?)
         }
     }
 

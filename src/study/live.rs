@@ -1,8 +1,8 @@
 //! The page of a run that is not complete.
 
 use super::page::{blocks_of, links_of, surfaces};
-use crate::report::page::{LivePage, View, Volume};
-use crate::simulation::Simulation;
+use zsim_report::page::{LivePage, View, Volume};
+use zsim_simulation::Simulation;
 
 /// The page of a full run of `simulation`, before its start: the true surfaces, the head and its springs.
 pub fn live_page(simulation: &Simulation) -> LivePage {

@@ -2,13 +2,13 @@
 
 use super::StudyError;
 use super::atomic_file::replace_text;
-use crate::estimation::EstimatorSpec;
-use crate::recording::Reader;
-use crate::simulation::{Run, Simulation};
-use crate::spec::{self, Source, SpecError};
-use crate::world::{World, WorldError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use zsim_base::spec::{self, Source, SpecError};
+use zsim_estimation::EstimatorSpec;
+use zsim_recording::Reader;
+use zsim_simulation::{Run, Simulation};
+use zsim_world::{World, WorldError};
 
 /// Inputs of a run: with these and the same version of zsim, the run can be repeated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

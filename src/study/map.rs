@@ -5,11 +5,11 @@ use super::atomic_file::AtomicFile;
 use super::best_estimate::BestEstimate;
 use super::map_options::MapOptions;
 use super::open_loop::OpenLoopRun;
-use crate::estimation::{EstimatorSpec, LocalisedPose, locate_map, map_of, merge_maps};
-use crate::geometry::Pose;
-use crate::recording::{read_surfel_map, write_surfel_map};
-use crate::surfel_map::SurfelMap;
 use std::path::Path;
+use zsim_base::geometry::Pose;
+use zsim_base::surfel_map::SurfelMap;
+use zsim_estimation::{EstimatorSpec, LocalisedPose, locate_map, map_of, merge_maps};
+use zsim_recording::{read_surfel_map, write_surfel_map};
 
 /// Result of merging two maps.
 #[derive(Debug, Clone, PartialEq)]

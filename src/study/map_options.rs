@@ -1,10 +1,10 @@
 //! The map that an estimate starts with.
 
 use super::StudyError;
-use crate::geometry::Pose;
-use crate::recording::read_surfel_map;
-use crate::surfel_map::SurfelMap;
 use std::path::Path;
+use zsim_base::geometry::Pose;
+use zsim_base::surfel_map::SurfelMap;
+use zsim_recording::read_surfel_map;
 
 /// A map in which to localise the head.
 #[derive(Debug, Clone, PartialEq)]

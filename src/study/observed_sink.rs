@@ -1,10 +1,10 @@
 //! A sink that also reports what it receives, for a live view.
 
 use super::{ProgressMonitor, StageData};
-use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
-use crate::time::Stamp;
-use crate::truth::{ClockTruth, TruthSample, TruthSink};
 use std::cell::RefCell;
+use zsim_base::measurement::{ImuSample, LidarScan, Sink, SinkError};
+use zsim_base::time::Stamp;
+use zsim_truth::{ClockTruth, TruthSample, TruthSink};
 
 /// Passes everything on to `sink`, and reports scans and true motion.
 pub(super) struct ObservedSink<'a, 'w, S> {

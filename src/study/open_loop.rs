@@ -4,19 +4,19 @@ use super::cadence::Cadence;
 use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, ProgressMonitor, Stage, StageData, StudyError};
-use crate::estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
-    covariance_blocks, radius_99,
-};
-use crate::evaluation::{DeadReckoning, EvaluationError, RestDetection};
-use crate::geometry::{PoseCovariance, Trajectory};
-use crate::measurement::{Calibration, LidarCorrection, Measurement};
-use crate::recording::{Reader, RecordingError, Selection, TumWriter};
-use crate::time::{Span, Stamp};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
+use zsim_base::geometry::{PoseCovariance, Trajectory};
+use zsim_base::measurement::{Calibration, LidarCorrection, Measurement};
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::{
+    EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
+    covariance_blocks, radius_99,
+};
+use zsim_evaluation::{DeadReckoning, EvaluationError, RestDetection};
+use zsim_recording::{Reader, RecordingError, Selection, TumWriter};
 
 /// Number of measurements between progress reports: about 1 s of data.
 const PROGRESS_INTERVAL: usize = 200;

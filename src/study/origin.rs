@@ -3,7 +3,7 @@
 use super::Manifest;
 use super::cloud::Surroundings;
 use super::sensor_models::RecordedSensors;
-use crate::simulation::SimulationSummary;
+use zsim_simulation::SimulationSummary;
 
 /// Origin of a recording; only the evaluation uses it, not the estimator.
 pub(super) struct Origin<'a> {

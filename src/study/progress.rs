@@ -1,10 +1,10 @@
 //! Progress reports and cancellation of experiments.
 
 use super::StudyError;
-use crate::estimation::{EstimatedPose, Evidence};
-use crate::measurement::{Calibration, LidarScan};
-use crate::truth::TruthSample;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use zsim_base::measurement::{Calibration, LidarScan};
+use zsim_estimation::{EstimatedPose, Evidence};
+use zsim_truth::TruthSample;
 
 /// Stage of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

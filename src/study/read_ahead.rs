@@ -1,9 +1,9 @@
 //! Reads a recording on a separate thread, so that the estimator does not wait for decompression and decoding.
 
-use crate::measurement::Measurement;
-use crate::recording::{Loss, Reader, RecordingError, Selection};
 use std::sync::mpsc::sync_channel;
 use std::thread;
+use zsim_base::measurement::Measurement;
+use zsim_recording::{Loss, Reader, RecordingError, Selection};
 
 /// Capacity of the queue, measurements: about 1 s of data.
 const QUEUE_CAPACITY: usize = 256;

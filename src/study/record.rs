@@ -2,16 +2,16 @@
 
 use super::observed_sink::ObservedSink;
 use super::{Manifest, ProgressMonitor, Stage, StageData, StudyError};
-use crate::measurement::{ImuSample, LidarScan, Sink, SinkError};
-use crate::recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
-use crate::simulation::{Outputs, Simulation, SimulationSummary};
-use crate::time::Stamp;
-use crate::truth::{ClockTruth, TruthSample, TruthSink};
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use zsim_base::measurement::{ImuSample, LidarScan, Sink, SinkError};
+use zsim_base::time::Stamp;
+use zsim_recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
+use zsim_simulation::{Outputs, Simulation, SimulationSummary};
+use zsim_truth::{ClockTruth, TruthSample, TruthSink};
 
 /// Runs `simulation` and writes its measurements and truth to the MCAP file `recording`.
 ///

@@ -2,12 +2,11 @@
 
 use super::Manifest;
 use super::sensor_models::RecordedSensors;
-use crate::recording::Reader;
-use crate::sensors::{ImuSpec, LidarSpec};
-use crate::simulation::{Named, NamedSpec};
-use crate::spec::{self, SpecError};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use zsim_base::spec::{self, Named, NamedSpec, SpecError};
+use zsim_recording::Reader;
+use zsim_sensors::{ImuSpec, LidarSpec};
 
 /// The manifest in a recording; of one that another version wrote with other keys, the sensors that can be read.
 pub(super) struct RecordedManifest {

@@ -4,14 +4,14 @@ use super::cloud_files::{CloudFiles, CloudOptions};
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{ProgressMonitor, Stage, StudyError};
-use crate::estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
-use crate::evaluation::Thinning;
-use crate::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
-use crate::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
-use crate::recording::{CloudPoint, Reader, RecordingError, Selection, write_result};
-use crate::report::page::MAX_PAGE_POINTS;
-use crate::time::{Span, Stamp};
 use std::path::Path;
+use zsim_base::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
+use zsim_base::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
+use zsim_evaluation::Thinning;
+use zsim_recording::{CloudPoint, Reader, RecordingError, Selection, write_result};
+use zsim_report::page::MAX_PAGE_POINTS;
 
 /// Maximum number of beams in the sample for the evaluation.
 const MAX_SAMPLED_BEAMS: usize = 100_000;

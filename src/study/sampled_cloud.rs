@@ -4,11 +4,11 @@ use super::cloud::Surroundings;
 use super::register::{LidarModel, MAX_POSE_GAP_S, ProjectedBeam};
 use super::truth_cursor::TruthCursor;
 use super::{ProgressMonitor, StudyError};
-use crate::evaluation::Thinning;
-use crate::geometry::{SmoothCursor, Trajectory, Vector};
-use crate::measurement::{Calibration, LidarCorrection, Measurement};
-use crate::recording::{Reader, Selection};
-use crate::time::Span;
+use zsim_base::geometry::{SmoothCursor, Trajectory, Vector};
+use zsim_base::measurement::{Calibration, LidarCorrection, Measurement};
+use zsim_base::time::Span;
+use zsim_evaluation::Thinning;
+use zsim_recording::{Reader, Selection};
 
 /// A recording with its estimate.
 pub(super) struct EstimatedRecording<'a> {

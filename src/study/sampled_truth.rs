@@ -3,10 +3,10 @@
 use super::bound::BoundAccumulator;
 use super::open_loop::OpenLoopRun;
 use super::true_clock::true_offset;
-use crate::evaluation::PoseSampler;
-use crate::geometry::{Pose, Trajectory};
-use crate::recording::{Reader, RecordingError, Truth};
-use crate::time::Stamp;
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::time::Stamp;
+use zsim_evaluation::PoseSampler;
+use zsim_recording::{Reader, RecordingError, Truth};
 
 /// The truth at the stamps of an estimate, from one pass over the recording.
 ///

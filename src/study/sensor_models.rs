@@ -1,13 +1,13 @@
 //! Sensor models for an estimate: noise and averaging, each value with its source.
 
 use super::{Manifest, StudyError};
-use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
-use crate::report::{NoiseMetrics, SensorMetrics, noise_sources};
-use crate::sensors::{Imu, ImuSpec, Lidar, LidarSpec};
-use crate::simulation::Run;
-use crate::spec::{Kind, SpecError, find, parse};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use zsim_base::measurement::{ImuAveraging, ImuNoise, LidarNoise};
+use zsim_base::spec::{Kind, SpecError, find, parse};
+use zsim_report::{NoiseMetrics, SensorMetrics, noise_sources};
+use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
+use zsim_simulation::Run;
 
 /// Where the value of a sensor model comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

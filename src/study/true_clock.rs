@@ -1,8 +1,8 @@
 //! True offset between the clocks of IMU and lidar.
 
-use crate::recording::{Reader, RecordingError, Selection, Truth};
-use crate::time::{Span, Stamp};
-use crate::truth::ClockTruth;
+use zsim_base::time::{Span, Stamp};
+use zsim_recording::{Reader, RecordingError, Selection, Truth};
+use zsim_truth::ClockTruth;
 
 /// The true clock offset, s, with its lidar time: IMU stamp minus lidar stamp of the same true time `now`.
 pub(super) fn true_offset(now: Stamp, clock: &ClockTruth) -> (Stamp, f64) {

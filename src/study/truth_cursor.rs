@@ -1,10 +1,10 @@
 //! Forward-only access to the recorded truth.
 
-use crate::geometry::{Pose, Trajectory};
-use crate::recording::{RecordingError, Truth, TruthReader};
-use crate::simulation::EPOCH;
-use crate::time::{Span, Stamp};
 use std::collections::VecDeque;
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::time::{Span, Stamp};
+use zsim_recording::{RecordingError, Truth, TruthReader};
+use zsim_simulation::EPOCH;
 
 /// Duration of the buffered truth: scans can be recorded out of order by up to this time.
 const BUFFER: Span = Span::from_nanos(1_000_000_000);

@@ -3,8 +3,8 @@
 use super::StudyError;
 use super::atomic_file::write_text;
 use super::spring::HeadExport;
-use crate::simulation::Simulation;
 use std::path::Path;
+use zsim_simulation::Simulation;
 
 /// Layout for `recording.mcap`.
 pub(super) const RECORDING_LAYOUT: &str = "recording.foxglove.json";
@@ -28,7 +28,7 @@ impl ViewerFiles {
     pub fn of(simulation: &Simulation) -> Self {
         let head_model = HeadExport::new(&simulation.inputs().head.spec, simulation.head());
         Self {
-            layout: include_str!("../../examples/viewers/recording.foxglove.json"),
+            layout: include_str!("layouts/recording.foxglove.json"),
             head_model: head_model.ok().map(|model| model.urdf()),
         }
     }
@@ -42,6 +42,6 @@ impl ViewerFiles {
 
 /// Writes the file for the result of an estimate to `folder`.
 pub(super) fn write_for_result(folder: &Path) -> Result<(), StudyError> {
-    let layout = include_str!("../../examples/viewers/result.foxglove.json");
+    let layout = include_str!("layouts/result.foxglove.json");
     write_text(folder, &folder.join(RESULT_LAYOUT), layout)
 }

@@ -11,11 +11,11 @@ use super::{
     CanopySpec, ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, ScatterSpec, SceneSpec,
     ShapeSpec, SwaySpec, WorldError,
 };
-use crate::geometry::{Pose, Route, Vector};
-use crate::spec::{Source, SpecError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::rc::Rc;
+use zsim_base::geometry::{Pose, Route, Vector};
+use zsim_base::spec::{Source, SpecError};
 
 /// A mesh without a unit that is longer is probably in mm, m.
 const LARGE_MESH_M: f64 = 500.0;

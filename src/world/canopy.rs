@@ -1,7 +1,7 @@
 //! Canopies: boxes of leaves or blades that are finer than a laser beam.
 
 use super::{MaterialId, Ray};
-use crate::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Vector};
 
 /// A box that stops rays at random depths.
 pub(super) struct Canopy {
@@ -63,8 +63,8 @@ impl Canopy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     fn canopy(world_from_body: &Pose) -> Canopy {
         Canopy::new(world_from_body, [4.0, 2.0, 1.0], 0.5, MaterialId(0))

@@ -21,13 +21,13 @@ pub(super) use boxes::BoxTree;
 use super::planes::{FaceId, FlatFace};
 use super::triangle::{Surfaces, Triangle};
 use super::{MaterialId, TimedRay};
-use crate::geometry::{SurfacePoint, Vector};
 use face::{Plane, SingleFace};
 use glamx::Vec3A;
 use packet_tree::{Found, PacketTree};
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use single_precision::{Vec3, single, single_reach};
+use zsim_base::geometry::{SurfacePoint, Vector};
 
 /// Triangles in a bounding-volume hierarchy for ray casting.
 pub(super) struct Caster {

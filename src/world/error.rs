@@ -1,4 +1,4 @@
-use crate::spec::SpecError;
+use zsim_base::spec::SpecError;
 
 /// Why a world cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

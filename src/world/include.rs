@@ -2,8 +2,8 @@
 
 use super::build::build;
 use super::{ItemSpec, SceneSpec, ShapeSpec, WorldError};
-use crate::spec::{Kind, Source, SpecError, find_from, parse};
 use std::collections::BTreeMap;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from, parse};
 
 /// Maximum depth of included scenes.
 const MAX_INCLUDE_DEPTH: usize = 16;
@@ -90,4 +90,13 @@ fn merge_named<T>(
         first.insert(name, value);
     }
     Ok(())
+}
+
+impl NamedSpec for SceneSpec {
+    const KIND: Kind = Kind::Scene;
+    type Error = WorldError;
+
+    fn resolved(self, source: &Source) -> Result<Self, WorldError> {
+        self.with_includes(source)
+    }
 }

@@ -4,7 +4,7 @@ use super::caster::{BoxTree, Caster, Crossing};
 use super::sway::Sway;
 use super::triangle::Triangle;
 use super::{MaterialId, SwaySpec};
-use crate::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Vector};
 
 /// Plants of one template.
 pub(super) struct Meadow {

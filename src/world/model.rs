@@ -6,10 +6,10 @@ use super::mover::Mover;
 use super::planes::PlaneMap;
 use super::section::{SectionPlane, Segment, edges};
 use super::{Hit, Material, MaterialId, Ray, SceneSpec, TimedRay, WorldError};
-use crate::geometry::{Route, Surface, SurfacePoint, Vector};
-use crate::spec::{Kind, Source, find, parse};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use zsim_base::geometry::{Route, Surface, SurfacePoint, Vector};
+use zsim_base::spec::{Kind, Source, find, parse};
 
 /// Distance within which two hits are the same surface for [`World::cast_beyond`], m.
 const SAME_SURFACE_M: f64 = 1e-4;

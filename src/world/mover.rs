@@ -3,7 +3,7 @@
 use super::MaterialId;
 use super::caster::{Caster, Crossing};
 use super::triangle::Triangle;
-use crate::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Vector};
 
 /// A rigid group of triangles that follows waypoints.
 pub(super) struct Mover {
@@ -95,8 +95,8 @@ impl Path {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     fn path(repeats: bool) -> Path {
         let pose =

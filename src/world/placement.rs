@@ -1,7 +1,7 @@
-use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use serde::ser::{Serialize, Serializer};
 use std::fmt;
+use zsim_base::geometry::{Pose, Vector, from_roll_pitch_yaw};
 
 /// A pose in a scene: `(x, y)`, `(x, y, z)`, `(x, y, z, yaw)`, or `(x, y, z, yaw, pitch, roll)`, in metres and degrees;
 /// omitted numbers are 0.
@@ -80,8 +80,8 @@ impl Serialize for Placement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Source, parse, to_text};
     use approx::assert_relative_eq;
+    use zsim_base::spec::{Source, parse, to_text};
 
     fn placement(text: &str) -> Result<Placement, String> {
         parse(&Source::in_memory("test", text)).map_err(|error| error.message().to_owned())

@@ -1,6 +1,6 @@
 //! Planes of a scene: the faces of one solid that touch and lie in one plane are one surface.
 
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Corners within this distance are one corner, m: above single precision at 100 m.
 const SAME_CORNER_M: f64 = 1e-4;

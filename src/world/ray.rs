@@ -1,5 +1,5 @@
 use super::{FaceId, MaterialId};
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// A ray of light.
 #[derive(Debug, Clone, Copy, PartialEq)]

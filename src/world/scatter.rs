@@ -1,10 +1,10 @@
 //! Scattered objects: positions are drawn one by one and rejected if too close to another object or a route.
 
 use super::{ScatterSpec, Turn};
-use crate::geometry::{Pose, Rotation, Route, Vector, from_roll_pitch_yaw};
-use crate::random::{Seed, Stream};
 use rand::RngExt;
 use std::collections::BTreeMap;
+use zsim_base::geometry::{Pose, Rotation, Route, Vector, from_roll_pitch_yaw};
+use zsim_base::random::{Seed, Stream};
 
 /// Maximum number of copies of one scatter: bounds the build time.
 const MAX_COUNT: usize = 200_000;

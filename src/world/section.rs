@@ -1,8 +1,8 @@
 //! Sections of a scene with planes, and the edges that outline its surfaces.
 
 use super::triangle::Triangle;
-use crate::geometry::Vector;
 use std::collections::BTreeMap;
+use zsim_base::geometry::Vector;
 
 /// Corners within this distance are one corner of the outline, m.
 const SAME_CORNER_M: f64 = 1e-3;
@@ -72,7 +72,7 @@ fn rounded(corner: &Vector) -> [i64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::triangle::parallelogram;
+    use crate::triangle::parallelogram;
 
     fn cube() -> Vec<Triangle> {
         let (x, y, z) = (Vector::x(), Vector::y(), Vector::z());

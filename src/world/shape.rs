@@ -9,10 +9,10 @@ pub use height_field::HeightsSpec;
 pub use wall::OpeningSpec;
 
 use super::triangle::{Triangle, parallelogram};
-use crate::geometry::Vector;
-use crate::spec::checked;
 use divisions::check_count;
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::Vector;
+use zsim_base::spec::checked;
 
 /// A shape in its own frame with z up, on the plane z = 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,9 +1,9 @@
 //! Data of a scene file. [`World::build`](super::World::build) checks and builds it.
 
 use super::{Placement, ShapeSpec};
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use zsim_base::spec::checked;
 
 /// A scene: materials, static items, movers, and routes to walk. Lengths in metres, z up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,9 +1,9 @@
 //! Plants that sway about their feet.
 
 use super::SwaySpec;
-use crate::geometry::{Pose, Rotation, Vector};
 use nalgebra::Unit;
 use std::f64::consts::{FRAC_PI_2, TAU};
+use zsim_base::geometry::{Pose, Rotation, Vector};
 
 /// The motion of one plant.
 pub(super) struct Sway {
@@ -62,8 +62,8 @@ impl Sway {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Source, parse};
     use approx::assert_relative_eq;
+    use zsim_base::spec::{Source, parse};
 
     fn plant_at(x_m: f64) -> Sway {
         let text = "(wind_deg: 0, lean_deg: 5, amplitude_deg: 10, frequency_hz: 0.5, gust_speed_m_per_s: 2, scatter: \

@@ -1,7 +1,7 @@
 //! Triangles of a scene.
 
 use super::MaterialId;
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Maximum number of triangles of a scene: each needs about 450 bytes while the scene is built.
 pub(super) const MAX_TRIANGLES: usize = 10_000_000;

@@ -101,8 +101,8 @@ fn panels_of(tree: &serde_json::Value) -> Vec<String> {
 fn layouts_for_viewers_show_topics_of_their_files() {
     let here = tempfile::tempdir().unwrap();
     assert!(script("viewers", here.path()).status().unwrap().success());
-    for (layout, file) in [("recording", "recording.mcap"), ("result", "estimate/result.mcap")] {
-        let text = std::fs::read_to_string(folder().join(format!("viewers/{layout}.foxglove.json"))).unwrap();
+    for (layout, file) in [("recording", "recording.mcap"), ("estimate/result", "estimate/result.mcap")] {
+        let text = std::fs::read_to_string(here.path().join(format!("{layout}.foxglove.json"))).unwrap();
         let layout: serde_json::Value = serde_json::from_str(&text).unwrap();
         let bytes = std::fs::read(here.path().join(file)).unwrap();
         let summary = mcap::Summary::read(&bytes).unwrap().expect("a summary");

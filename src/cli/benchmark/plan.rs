@@ -1,16 +1,16 @@
 //! `zsim benchmark plan`: simulates the recordings of a suite.
 
 use super::suite::{Item, SUITE, Suite};
-use crate::cli::arguments::Global;
-use crate::cli::bars::{WorkBar, stop_flag};
-use crate::cli::usage::Usage;
-use crate::cli::{Completion, output, sweep};
+use crate::arguments::Global;
+use crate::bars::{WorkBar, stop_flag};
+use crate::usage::Usage;
+use crate::{Completion, output, sweep};
 use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use zsim::study::sweep::{Plan, SuiteRecording};
-use zsim::study::{ProgressMonitor, replace_text};
+use zsim_study::sweep::{Plan, SuiteRecording};
+use zsim_study::{ProgressMonitor, replace_text};
 
 /// Simulate the recordings of a suite, with the truth apart
 ///

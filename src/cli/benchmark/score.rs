@@ -2,15 +2,15 @@
 
 use super::scores::{Score, System, failures, figures, page, runs_csv, systems_table};
 use super::suite::Suite;
-use crate::cli::arguments::Global;
-use crate::cli::usage::Usage;
-use crate::cli::{Completion, output, trajectory_file};
+use crate::arguments::Global;
+use crate::usage::Usage;
+use crate::{Completion, output, trajectory_file};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use zsim::evaluation::{Pairs, TrajectoryErrors};
-use zsim::geometry::Trajectory;
-use zsim::study::replace_text;
+use zsim_base::geometry::Trajectory;
+use zsim_evaluation::{Pairs, TrajectoryErrors};
+use zsim_study::replace_text;
 
 /// Compare the trajectories of one or more systems with the truth of a suite
 ///
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME=FOLDER", required = true, value_parser = system)]
     system: Vec<(String, PathBuf)>,
     /// Least fraction of the truth's time that a trajectory covers (95% or 0.95)
-    #[arg(long, value_name = "FRACTION", default_value = "90%", value_parser = crate::cli::limit::fraction)]
+    #[arg(long, value_name = "FRACTION", default_value = "90%", value_parser = crate::limit::fraction)]
     min_coverage: f64,
 }
 

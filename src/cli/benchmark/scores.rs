@@ -2,9 +2,8 @@
 
 use super::suite::Suite;
 use serde_json::{Map, Value, json};
-use zsim::evaluation::TrajectoryErrors;
-use zsim::report;
-use zsim::report::page::{BenchmarkPage, PageTable};
+use zsim_evaluation::TrajectoryErrors;
+use zsim_report::page::{BenchmarkPage, PageTable};
 
 /// A system with a score for each recording of the suite.
 pub(super) struct System {
@@ -66,7 +65,7 @@ impl System {
 
 /// A length, or a dash.
 fn length(length_m: Option<f64>) -> String {
-    length_m.filter(|length_m| length_m.is_finite()).map_or_else(|| "-".to_owned(), report::length)
+    length_m.filter(|length_m| length_m.is_finite()).map_or_else(|| "-".to_owned(), zsim_report::length)
 }
 
 fn systems_header() -> Vec<&'static str> {
@@ -75,7 +74,7 @@ fn systems_header() -> Vec<&'static str> {
 
 /// The table of the systems for the terminal.
 pub(super) fn systems_table(systems: &[System]) -> String {
-    report::table(&systems_header(), &systems.iter().map(System::row).collect::<Vec<_>>(), true)
+    zsim_report::table(&systems_header(), &systems.iter().map(System::row).collect::<Vec<_>>(), true)
 }
 
 /// Why trajectories count as failed, for the terminal; empty if none does.
@@ -98,7 +97,7 @@ pub(super) fn failures(suite: &Suite, systems: &[System]) -> String {
 
 /// The errors by key, and the failure.
 fn values(score: &Score) -> Map<String, Value> {
-    let mut values = score.errors.as_ref().map(report::trajectory_figures).unwrap_or_default();
+    let mut values = score.errors.as_ref().map(zsim_report::trajectory_figures).unwrap_or_default();
     values.insert("failure".to_owned(), json!(score.failure));
     values
 }

@@ -4,7 +4,7 @@ use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
-use zsim::study::sweep::{Plan, SuiteRecording};
+use zsim_study::sweep::{Plan, SuiteRecording};
 
 /// Name of the list in the folder of the benchmark.
 pub(super) const SUITE: &str = "suite.json";

@@ -1,12 +1,12 @@
 //! Data of a run as the live page needs it: copies, thinned where the run produces them.
 
 use std::time::{Duration, Instant};
-use zsim::estimation::{EstimatedPose, Evidence, Finding, Status, Warning, findings};
-use zsim::geometry::{Pose, Vector};
-use zsim::measurement::LidarScan;
-use zsim::report::page::LiveVerdict;
-use zsim::study::{Stage, StageData, StudyEvent};
-use zsim::time::{Span, Stamp};
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::measurement::LidarScan;
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::{EstimatedPose, Evidence, Finding, Status, Warning, findings};
+use zsim_report::page::LiveVerdict;
+use zsim_study::{Stage, StageData, StudyEvent};
 
 /// Maximum number of returns that are copied from a scan.
 const MAX_RETURNS: usize = 128;
@@ -98,7 +98,7 @@ impl Framer {
 }
 
 /// The verdict of the most severe finding; times are relative to `start`.
-pub(in crate::cli) fn verdict(findings: &[Finding], start: Stamp) -> LiveVerdict {
+pub(crate) fn verdict(findings: &[Finding], start: Stamp) -> LiveVerdict {
     let Some(worst) = findings.iter().max_by_key(|finding| finding.status) else {
         return LiveVerdict { status: Status::default().name().to_owned(), reason: "no problem so far".to_owned() };
     };
@@ -109,7 +109,7 @@ pub(in crate::cli) fn verdict(findings: &[Finding], start: Stamp) -> LiveVerdict
 
 fn thinned(scan: &LidarScan) -> Vec<Return> {
     let stride = scan.returns.len().div_ceil(MAX_RETURNS).max(1);
-    let copy = |each: &zsim::measurement::LidarReturn| Return {
+    let copy = |each: &zsim_base::measurement::LidarReturn| Return {
         stamp: scan.stamp + each.offset,
         point_in_laser: each.point_in_laser.cast(),
     };

@@ -1,6 +1,6 @@
 //! Sequences that grow during a run, of which a page requests the items that it lacks.
 
-use zsim::report::page::Increment;
+use zsim_report::page::Increment;
 
 /// How much of a sequence a page has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -2,7 +2,7 @@
 
 use super::growing::Growing;
 use std::collections::BTreeSet;
-use zsim::report::page::{LivePoint, MAX_PAGE_POINTS, Volume};
+use zsim_report::page::{LivePoint, MAX_PAGE_POINTS, Volume};
 
 /// Edge of a voxel at first, m.
 const VOXEL_M: f64 = 0.05;
@@ -67,7 +67,7 @@ fn voxel(point: &LivePoint, voxel_m: f64) -> Voxel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zsim::geometry::Vector;
+    use zsim_base::geometry::Vector;
 
     fn point(x: f64, y: f64) -> LivePoint {
         LivePoint { position: Vector::new(x, y, 0.01), t_s: 0.0 }

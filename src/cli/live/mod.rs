@@ -26,8 +26,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use zsim::report::page::{LiveEnd, LivePage, LiveVerdict};
-use zsim::study::{EstimateResult, StudyError, StudyEvent};
+use zsim_report::page::{LiveEnd, LivePage, LiveVerdict};
+use zsim_study::{EstimateResult, StudyError, StudyEvent};
 
 /// Time between two changes of the state: pages are updated up to 20 times a second.
 const CHANGE_PERIOD: Duration = Duration::from_millis(50);

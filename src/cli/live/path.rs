@@ -2,8 +2,8 @@
 
 use super::growing::Growing;
 use std::collections::VecDeque;
-use zsim::geometry::Pose;
-use zsim::report::page::{MAX_PAGE_POSES, TimedPose, TruePoses};
+use zsim_base::geometry::Pose;
+use zsim_report::page::{MAX_PAGE_POSES, TimedPose, TruePoses};
 
 /// Time between the poses of a path at first, s.
 const SPACING_S: f64 = 0.02;

@@ -5,10 +5,10 @@ use super::growing::Cursor;
 use super::map::ThinnedMap;
 use super::path::{GrowingPath, RecentPoses};
 use std::collections::VecDeque;
-use zsim::geometry::{Pose, Vector};
-use zsim::report::page::{LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TimedPose, TruePoses, Volume};
-use zsim::study::Stage;
-use zsim::time::Stamp;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::time::Stamp;
+use zsim_report::page::{LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TimedPose, TruePoses, Volume};
+use zsim_study::Stage;
 
 /// Maximum number of points and of poses in an update.
 const MAX_ITEMS: usize = 20_000;
@@ -281,8 +281,8 @@ fn name(stage: Stage) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zsim::geometry::Rotation;
-    use zsim::time::Span;
+    use zsim_base::geometry::Rotation;
+    use zsim_base::time::Span;
 
     fn stamp(t_s: f64) -> Stamp {
         Stamp::from_nanos(1_000_000_000_000) + Span::from_seconds(t_s)

@@ -5,7 +5,7 @@ use super::viewers::Viewers;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tokio::sync::watch;
-use zsim::report::page::{LiveEnd, LiveVerdict};
+use zsim_report::page::{LiveEnd, LiveVerdict};
 
 /// State of a run and of its pages.
 pub(super) struct Shared {

@@ -1,7 +1,7 @@
 //! The program `zsim-ros2`, as a child process.
 
 use super::frame::Frame;
-use crate::cli::usage::Usage;
+use crate::usage::Usage;
 use anyhow::Context;
 use std::io::{BufReader, BufWriter};
 use std::path::PathBuf;

@@ -5,17 +5,17 @@ use super::bridge::Bridge;
 use super::session::{Limits, Session, Setup};
 use super::sources::Sources;
 use super::start::gather;
-use crate::cli::arguments::{self, EstimatorSettings, Global, OutArguments, calibration};
-use crate::cli::bars::{WorkBar, stop_flag};
-use crate::cli::completion::Completion;
-use crate::cli::{output, quantity};
+use crate::arguments::{self, EstimatorSettings, Global, OutArguments, calibration};
+use crate::bars::{WorkBar, stop_flag};
+use crate::completion::Completion;
+use crate::{output, quantity};
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-use zsim::geometry::Pose;
-use zsim::recording::TopicPreference;
-use zsim::study::MapOptions;
+use zsim_base::geometry::Pose;
+use zsim_recording::TopicPreference;
+use zsim_study::MapOptions;
 
 /// Estimate trajectory and map from live ROS 2 topics
 ///
@@ -27,7 +27,7 @@ use zsim::study::MapOptions;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim live --out results/today\n  zsim live --lidar-topic /scan --imu-topic \
                         /imu/data_raw --calibration head.ron --idle 5s")]
-pub(in crate::cli) struct LiveCommand {
+pub(crate) struct LiveCommand {
     /// The lidar's topic [default: found]
     #[arg(long, value_name = "TOPIC")]
     lidar_topic: Option<String>,
@@ -60,7 +60,7 @@ pub(in crate::cli) struct LiveCommand {
     network: NetworkArguments,
 }
 
-pub(in crate::cli) fn run(command: &LiveCommand, global: &Global) -> anyhow::Result<Completion> {
+pub(crate) fn run(command: &LiveCommand, global: &Global) -> anyhow::Result<Completion> {
     let (spec, given) = (command.estimator.spec()?, calibration(command.calibration.as_deref())?);
     let within = |path: &PathBuf| MapOptions::read(path, command.start, false);
     let map = command.map.as_ref().map(within).transpose()?;

@@ -3,11 +3,11 @@
 use super::bridge::Bridge;
 use super::frame::{Frame, Quality, RosTopic, TopicId};
 use super::{NetworkArguments, depth_of};
-use crate::cli::arguments::Global;
-use crate::cli::bars::{WorkBar, stop_flag};
-use crate::cli::completion::Completion;
-use crate::cli::output;
-use crate::cli::usage::Usage;
+use crate::arguments::Global;
+use crate::bars::{WorkBar, stop_flag};
+use crate::completion::Completion;
+use crate::output;
+use crate::usage::Usage;
 use anyhow::ensure;
 use clap::Args;
 use serde_json::json;
@@ -17,9 +17,9 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use zsim::recording::{Loss, Reader, RecordedMessage};
-use zsim::study::StudyError;
-use zsim::time::Stamp;
+use zsim_base::time::Stamp;
+use zsim_recording::{Loss, Reader, RecordedMessage};
+use zsim_study::StudyError;
 
 /// The topic whose messages a late subscriber needs.
 const LATCHED: &str = "/tf_static";
@@ -36,7 +36,7 @@ const NAP: Duration = Duration::from_millis(100);
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim play recording.mcap\n  zsim play recording.mcap --topic /scan --topic \
                         /imu/data_raw --rate 2 --wait")]
-pub(in crate::cli) struct PlayCommand {
+pub(crate) struct PlayCommand {
     /// The recording: MCAP, or rosbag2 (a folder or a database)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
@@ -53,7 +53,7 @@ pub(in crate::cli) struct PlayCommand {
     network: NetworkArguments,
 }
 
-pub(in crate::cli) fn run(command: &PlayCommand, global: &Global) -> anyhow::Result<Completion> {
+pub(crate) fn run(command: &PlayCommand, global: &Global) -> anyhow::Result<Completion> {
     ensure!(
         command.rate.is_finite() && command.rate > 0.0,
         Usage(format!("--rate {}: a factor above 0 is needed", command.rate))

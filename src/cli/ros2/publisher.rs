@@ -5,11 +5,11 @@ use super::depth_of;
 use super::frame::{Frame, Quality, RosTopic, TopicId};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
-use zsim::estimation::EstimatedPose;
-use zsim::geometry::{Kinematics, Pose, Trajectory, Vector};
-use zsim::measurement::{LidarScan, Measurement};
-use zsim::recording::{CloudPoint, Diagnostic, EstimateMessages, EstimateTopic};
-use zsim::time::{Span, Stamp};
+use zsim_base::geometry::{Kinematics, Pose, Trajectory, Vector};
+use zsim_base::measurement::{LidarScan, Measurement};
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::EstimatedPose;
+use zsim_recording::{CloudPoint, Diagnostic, EstimateMessages, EstimateTopic};
 
 /// Time between poses of the path, at first.
 const PATH_PERIOD: Span = Span::from_nanos(200_000_000);

@@ -5,10 +5,10 @@ use super::frame::Frame;
 use super::publisher::EstimatePublisher;
 use super::sources::Sources;
 use super::start::Sensors;
-use crate::cli::arguments::Global;
-use crate::cli::bars::WorkBar;
-use crate::cli::completion::Completion;
-use crate::cli::{live, output};
+use crate::arguments::Global;
+use crate::bars::WorkBar;
+use crate::completion::Completion;
+use crate::{live, output};
 use serde_json::json;
 use std::fs::File;
 use std::io::BufWriter;
@@ -16,14 +16,14 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
-use zsim::estimation::{
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::{Calibration, Measurement};
+use zsim_base::time::Stamp;
+use zsim_estimation::{
     EstimatedPose, EstimationError, Estimator, EstimatorSpec, Evidence, Status, Warning, WindowReport, findings,
 };
-use zsim::geometry::Vector;
-use zsim::measurement::{Calibration, Measurement};
-use zsim::recording::{Diagnostic, DiagnosticLevel, Incoming, ReceivedWriter, TumWriter};
-use zsim::study::{Cadence, MapOptions};
-use zsim::time::Stamp;
+use zsim_recording::{Diagnostic, DiagnosticLevel, Incoming, ReceivedWriter, TumWriter};
+use zsim_study::{Cadence, MapOptions};
 
 /// Time between looks at the stop flag.
 const NAP: Duration = Duration::from_millis(100);

@@ -4,7 +4,7 @@ use super::bridge::Bridge;
 use super::depth_of;
 use super::frame::{Frame, Quality, RosTopic, TopicId};
 use std::collections::BTreeMap;
-use zsim::recording::TopicPreference;
+use zsim_recording::TopicPreference;
 
 /// Types of lidars' messages.
 const LIDARS: [&str; 5] = [

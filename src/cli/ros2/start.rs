@@ -3,14 +3,14 @@
 use super::bridge::Bridge;
 use super::frame::{Frame, RosTopic};
 use super::sources::{Purpose, Sources};
-use crate::cli::bars::WorkBar;
+use crate::bars::WorkBar;
 use anyhow::{bail, ensure};
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::time::{Duration, Instant};
-use zsim::recording::{FoundCalibration, Reader, ReceivedWriter, Selection, TopicPreference};
-use zsim::study::{CalibrationSpec, recording_calibration};
-use zsim::time::Stamp;
+use zsim_base::time::Stamp;
+use zsim_recording::{FoundCalibration, Reader, ReceivedWriter, Selection, TopicPreference};
+use zsim_study::{CalibrationSpec, recording_calibration};
 
 /// Time of both sensors that shows how to read them, s: some periods of each, and the rest in which the estimator starts.
 const ENOUGH_S: f64 = 3.0;

@@ -7,18 +7,17 @@ use super::{Completion, output};
 use clap::{Args, Subcommand, ValueEnum};
 use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::json;
-use zsim::dynamics::HeadSpec;
-use zsim::elasticity::SpringSpec;
-use zsim::estimation::EstimatorSpec;
-use zsim::motion::MotionSpec;
-use zsim::report;
-use zsim::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use zsim::simulation::FaultsSpec;
-use zsim::spec::{Kind, find, names};
-use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::spring::design::DesignSpec;
-use zsim::study::sweep::SweepSpec;
-use zsim::world::SceneSpec;
+use zsim_base::spec::{Kind, find, names};
+use zsim_dynamics::HeadSpec;
+use zsim_elasticity::SpringSpec;
+use zsim_estimation::EstimatorSpec;
+use zsim_motion::MotionSpec;
+use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use zsim_simulation::FaultsSpec;
+use zsim_study::reproduction::ExperimentSpec;
+use zsim_study::spring::design::DesignSpec;
+use zsim_study::sweep::SweepSpec;
+use zsim_world::SceneSpec;
 
 /// List and show the specs that ship, and the keys of each kind of spec
 #[derive(Args)]
@@ -120,7 +119,7 @@ fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<()> {
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| wanted.is_none_or(|wanted| wanted == *kind)).collect();
     let width = kinds.iter().map(|kind| kind.folder().len()).max().unwrap_or_default();
     let line = |kind: &Kind| format!("{:width$}  {}", kind.folder(), names(*kind).join(", "));
-    let lines = kinds.iter().map(|kind| report::wrapped(&line(kind), &" ".repeat(width + 2)));
+    let lines = kinds.iter().map(|kind| zsim_report::wrapped(&line(kind), &" ".repeat(width + 2)));
     let figures = kinds.iter().map(|kind| (kind.folder().to_owned(), json!(names(*kind)))).collect();
     output::print_result(global, &lines.collect::<String>(), serde_json::Value::Object(figures), None)
 }

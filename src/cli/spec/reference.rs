@@ -3,7 +3,7 @@
 use schemars::Schema;
 use serde_json::Value;
 use std::collections::{BTreeSet, VecDeque};
-use zsim::spec::{Kind, split_unit};
+use zsim_base::spec::{Kind, split_unit};
 
 const HEADER: &str = "| key | type | unit | default | range | meaning |\n|---|---|---|---|---|---|\n";
 

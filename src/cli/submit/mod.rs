@@ -12,7 +12,7 @@ use clap::{ArgGroup, Args};
 use serde_json::json;
 use std::path::PathBuf;
 use submission::Submission;
-use zsim::study::sweep::{Shard, Sweep};
+use zsim_study::sweep::{Shard, Sweep};
 
 /// Default number of runs per element; a scheduler needs about 1 s for each element.
 const RUNS_PER_ELEMENT: u64 = 20;

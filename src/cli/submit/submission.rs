@@ -3,8 +3,8 @@
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use zsim::study::replace_text;
-use zsim::study::sweep::Sweep;
+use zsim_study::replace_text;
+use zsim_study::sweep::Sweep;
 
 /// Memory above the limit of a run, MiB: for the process that supervises the runs.
 const SUPERVISOR_MEMORY_MIB: u64 = 256;

@@ -1,9 +1,9 @@
 //! Initial clock offset between IMU and fixes: the one at which the gyroscope best explains the rotation of the fixes.
 
 use super::fixes::Fixes;
-use crate::estimation::EstimationError;
-use crate::estimation::strapdown::Interval;
-use crate::geometry::Vector;
+use crate::EstimationError;
+use crate::strapdown::Interval;
+use zsim_base::geometry::Vector;
 
 /// Offsets from minus to plus this are searched, s; a larger offset must be specified.
 const MAX_OFFSET_S: f64 = 1.0;

@@ -12,11 +12,11 @@
 //! A fix, interpolated at `u - l` for the IMU time `u`, measures `theta + omega l` and `p + v l`.
 
 use super::fixes::FixSigmas;
-use crate::estimation::EstimatorSpec;
-use crate::estimation::strapdown::{Biases, Interval, State};
-use crate::geometry::{Pose, Rotation, Vector, gravity_in_world, skew};
-use crate::measurement::ImuNoise;
+use crate::EstimatorSpec;
+use crate::strapdown::{Biases, Interval, State};
 use nalgebra::{Matrix3, SMatrix, SVector};
+use zsim_base::geometry::{Pose, Rotation, Vector, gravity_in_world, skew};
+use zsim_base::measurement::ImuNoise;
 
 /// Time between two updates of the filter, s: the averaging time of [`FixSigmas`].
 pub(super) const EPOCH_S: f64 = 0.05;

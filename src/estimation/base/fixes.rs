@@ -1,8 +1,8 @@
 //! Interpolated pose fixes of the IMU.
 
-use crate::estimation::EstimationError;
-use crate::geometry::{Pose, Trajectory};
-use crate::time::{Span, Stamp};
+use crate::EstimationError;
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::time::{Span, Stamp};
 
 /// Maximum time between two fixes for interpolation, s.
 const MAX_INTERPOLATION_S: f64 = 0.1;

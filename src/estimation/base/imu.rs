@@ -1,7 +1,7 @@
 //! The IMU on the base.
 
-use crate::geometry::Pose;
-use crate::measurement::{ImuAveraging, ImuNoise};
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::{ImuAveraging, ImuNoise};
 
 /// Description of the base's IMU.
 #[derive(Debug, Clone, PartialEq)]

@@ -29,10 +29,10 @@ use super::inertial::{InertialStream, Screen, Screened};
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::{EstimationError, EstimatorSpec};
-use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
-use crate::signal::Regularity;
-use crate::time::Stamp;
 use fixes::Fixes;
+use zsim_base::measurement::{ImuAveraging, ImuNoise, ImuSample};
+use zsim_base::signal::Regularity;
+use zsim_base::time::Stamp;
 
 /// Minimum overlap in time of fixes and IMU samples, s: needed to find the sample rate and the clock offset.
 const MIN_OVERLAP_S: f64 = 5.0;

@@ -3,12 +3,12 @@
 use super::filter::{EPOCH_S, ErrorMatrix, Estimate, Filter, Innovation};
 use super::fixes::{FixSigmas, Fixes};
 use super::imu::BaseImu;
-use crate::estimation::nominal::{Correction, Nominal};
-use crate::estimation::strapdown::Interval;
-use crate::estimation::{EstimationError, EstimatorSpec};
-use crate::geometry::{Pose, Rotation, Trajectory, Vector};
-use crate::time::Stamp;
+use crate::nominal::{Correction, Nominal};
+use crate::strapdown::Interval;
+use crate::{EstimationError, EstimatorSpec};
 use std::ops::Range;
+use zsim_base::geometry::{Pose, Rotation, Trajectory, Vector};
+use zsim_base::time::Stamp;
 
 /// Estimated trajectory of the base and parameters of its IMU.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! Morton codes of grid cells: sorted along a Z curve (Morton 1966), the children of a coarse cell are contiguous.
 
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Edge of the finest cells, m: large against the beam spacing at short range, small against moving objects.
 pub(super) const EDGE_M: f64 = 0.1;

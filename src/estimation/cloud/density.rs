@@ -2,7 +2,7 @@
 
 use super::ProjectedReturn;
 use super::cell::{EDGE_M, coordinates, morton_code};
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Range up to which the finest cells are used, m; each doubling uses the next level, as beams diverge with range.
 const FINEST_RANGE_M: f64 = 5.0;
@@ -132,7 +132,7 @@ impl<'a> IsolationTest<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Stamp;
+    use zsim_base::time::Stamp;
 
     fn hit(point_in_map: Vector, range_m: f64) -> ProjectedReturn {
         ProjectedReturn { stamp: Stamp::default(), point_in_map, origin_in_map: point_in_map - Vector::x() * range_m }

@@ -7,8 +7,8 @@ use super::ProjectedReturn;
 use super::cell::{EDGE_M, coordinates, coordinates_of, morton_code};
 use super::cell_set::{CellSet, Cube, cube_of};
 use super::density::{BlockCounts, Density};
-use crate::geometry::Vector;
 use rayon::prelude::*;
+use zsim_base::geometry::Vector;
 
 /// Only every fourth beam is traced, to save time; neighbouring beams cross the same cells.
 const STRIDE: usize = 4;
@@ -155,7 +155,7 @@ impl Iterator for Traversal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Stamp;
+    use zsim_base::time::Stamp;
 
     fn beam(from: [f64; 3], to: [f64; 3]) -> ProjectedReturn {
         ProjectedReturn { stamp: Stamp::default(), point_in_map: to.into(), origin_in_map: from.into() }

@@ -6,8 +6,8 @@
 //! neighbours on one side predict the range.
 
 use super::ProjectedReturn;
-use crate::geometry::Vector;
-use crate::measurement::LidarNoise;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::LidarNoise;
 
 /// Maximum angle between neighbouring beams, rad.
 const MAX_NEIGHBOUR_RAD: f64 = 0.02;
@@ -75,7 +75,7 @@ fn is_on_line(beam: &PolarReturn, one: &PolarReturn, two: &PolarReturn) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Stamp;
+    use zsim_base::time::Stamp;
 
     const NOISE: LidarNoise = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
 

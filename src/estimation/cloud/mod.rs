@@ -20,12 +20,12 @@ mod sigma;
 pub use projected_return::ProjectedReturn;
 pub use sigma::point_sigma_m;
 
-use crate::measurement::LidarNoise;
-use crate::time::{Span, Stamp};
 use density::{BlockCounts, Density, IsolationTest};
 use dynamic::{DynamicCells, FreeSpace};
 use rayon::prelude::*;
 use std::collections::VecDeque;
+use zsim_base::measurement::LidarNoise;
+use zsim_base::time::{Span, Stamp};
 
 /// Length of a block, 1 s: about one swing of the head.
 const BLOCK: Span = Span::from_nanos(1_000_000_000);
@@ -157,7 +157,7 @@ impl<T: Send + Sync> CloudFilter<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
+    use zsim_base::geometry::Vector;
 
     const NOISE: LidarNoise = LidarNoise { near_sigma_m: 0.01, near_m: 10.0, far_sigma_m: 0.03, far_m: 30.0 };
 

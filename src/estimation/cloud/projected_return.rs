@@ -1,7 +1,7 @@
 //! A return of the laser in the world frame.
 
-use crate::geometry::Vector;
-use crate::time::Stamp;
+use zsim_base::geometry::Vector;
+use zsim_base::time::Stamp;
 
 /// A lidar return, projected into the map by the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Position uncertainty of a point of the cloud.
 
-use crate::geometry::{PoseCovariance, Vector, skew};
+use zsim_base::geometry::{PoseCovariance, Vector, skew};
 
 /// Root mean square position error of a point in the map, m.
 ///

@@ -2,10 +2,10 @@
 
 use super::gauge::{Gauge, Mark};
 use super::{ConsiderCovariance, START_STATES, View, pose_error_matrix};
-use crate::estimation::output::TURN_LEVER_M;
-use crate::geometry::Vector;
-use crate::time::Stamp;
+use crate::output::TURN_LEVER_M;
 use nalgebra::{Matrix6, SMatrix};
+use zsim_base::geometry::Vector;
+use zsim_base::time::Stamp;
 
 /// The view number of the gauge; the last number is that of the map.
 const GAUGE: u64 = u64::MAX - 1;
@@ -14,7 +14,7 @@ const FIRST_MARK: u64 = GAUGE - 1;
 
 impl ConsiderCovariance {
     /// [`ConsiderCovariance::covariance_at`] relative to the gauge; relative to the map if there is no gauge.
-    pub(in crate::estimation) fn covariance_against_gauge(&self, point: &Vector) -> Matrix6<f64> {
+    pub(crate) fn covariance_against_gauge(&self, point: &Vector) -> Matrix6<f64> {
         let with_start = |at: usize| self.views[at].with_start.fixed_columns::<6>(0).into_owned();
         let by = pose_error_matrix(&(point - self.pivot));
         self.against_gauge(point, &by, &self.start.fixed_view::<6, 6>(0, 0).into_owned(), with_start)
@@ -38,7 +38,7 @@ impl ConsiderCovariance {
     }
 
     /// Adds the current window start to the gauge.
-    pub(in crate::estimation) fn add_start_to_gauge(&mut self) {
+    pub(crate) fn add_start_to_gauge(&mut self) {
         let own = self.start.fixed_view::<6, 6>(0, 0).into_owned();
         let with_start = self.start.fixed_rows::<6>(0).into_owned();
         let with_views: Vec<Matrix6<f64>> =
@@ -47,7 +47,7 @@ impl ConsiderCovariance {
     }
 
     /// Builds the gauge again, from the window starts marked up to `until`.
-    pub(in crate::estimation) fn rebuild_gauge(&mut self, until: Stamp) {
+    pub(crate) fn rebuild_gauge(&mut self, until: Stamp) {
         self.remove_view(GAUGE);
         self.gauge = None;
         for mark in self.marks.clone().iter().take_while(|mark| mark.stamp <= until) {
@@ -92,19 +92,19 @@ impl ConsiderCovariance {
     }
 
     /// Stores the current window start, at `stamp`, until the gauge is complete.
-    pub(in crate::estimation) fn mark_start(&mut self, stamp: Stamp) {
+    pub(crate) fn mark_start(&mut self, stamp: Stamp) {
         let number = self.marks.last().map_or(FIRST_MARK, |last| last.number - 1);
         self.add_view(number);
         self.marks.push(Mark { number, pivot: self.pivot, stamp });
     }
 
     /// Stamp of the first marked window start.
-    pub(in crate::estimation) fn first_mark(&self) -> Option<Stamp> {
+    pub(crate) fn first_mark(&self) -> Option<Stamp> {
         self.marks.first().map(|mark| mark.stamp)
     }
 
     /// Removes the marks; returns their stamps and the covariances of their errors relative to the gauge.
-    pub(in crate::estimation) fn take_marks(&mut self) -> Vec<(Stamp, Matrix6<f64>)> {
+    pub(crate) fn take_marks(&mut self) -> Vec<(Stamp, Matrix6<f64>)> {
         let marks = std::mem::take(&mut self.marks);
         let covariances = marks.iter().filter_map(|mark| {
             let own = self.views.iter().position(|view| view.number == mark.number)?;

@@ -1,8 +1,8 @@
 //! The alignment that a covariance is relative to, and the window starts that it is built from.
 
-use crate::geometry::Vector;
-use crate::time::Stamp;
 use nalgebra::Matrix6;
+use zsim_base::geometry::Vector;
+use zsim_base::time::Stamp;
 
 /// The rigid transform that aligns the first window starts with the truth by least squares.
 ///

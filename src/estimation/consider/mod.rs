@@ -19,8 +19,8 @@ mod gauge;
 use self::gauge::{Gauge, Mark};
 use super::residual::GYRO_BIAS;
 use super::views::{MAP, ViewUpdate};
-use crate::geometry::{Vector, skew};
 use nalgebra::{Matrix6, SMatrix};
+use zsim_base::geometry::{Vector, skew};
 
 /// Standard deviations of the pose after a gap with unknown motion: rotation, rad, and translation, m.
 const GAP_SIGMA: (f64, f64) = (1.0, 1.0);

@@ -1,8 +1,8 @@
 //! Reports on the windows, and the warnings derived from them.
 
-use crate::estimation::{Warning, WarningKind, WindowReport};
-use crate::time::Stamp;
+use crate::{Warning, WarningKind, WindowReport};
 use std::mem::discriminant;
+use zsim_base::time::Stamp;
 
 /// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
 ///
@@ -117,7 +117,7 @@ fn is_dead_reckoning(problem: &WarningKind) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
+    use zsim_base::geometry::Vector;
 
     #[test]
     fn a_trace_of_information_about_a_direction_is_dead_reckoning() {

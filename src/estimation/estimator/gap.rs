@@ -2,11 +2,11 @@
 
 use super::Estimator;
 use super::phase::{GapRecovery, Gathering, Phase, Tracking};
-use crate::estimation::EstimationError;
-use crate::estimation::coasting::Coasting;
-use crate::estimation::local_map::LocalMap;
-use crate::estimation::localisation::GapRelocalisation;
-use crate::estimation::window::Window;
+use crate::EstimationError;
+use crate::coasting::Coasting;
+use crate::local_map::LocalMap;
+use crate::localisation::GapRelocalisation;
+use crate::window::Window;
 
 impl Estimator {
     /// Discards what a gap makes useless: the window, whose content becomes final, or the gathered segments.

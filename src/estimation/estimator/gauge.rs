@@ -1,9 +1,9 @@
 //! Builds the gauge: the window starts over which the trajectory is aligned when errors are reported.
 
-use crate::estimation::ALIGNMENT_S;
-use crate::estimation::consider::ConsiderCovariance;
-use crate::geometry::PoseCovariance;
-use crate::time::{Span, Stamp};
+use crate::ALIGNMENT_S;
+use crate::consider::ConsiderCovariance;
+use zsim_base::geometry::PoseCovariance;
+use zsim_base::time::{Span, Stamp};
 
 /// Interval between marked window starts while the gauge is built, s.
 const MARK_INTERVAL_S: f64 = 1.0;

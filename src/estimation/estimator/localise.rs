@@ -2,10 +2,10 @@
 
 use super::Estimator;
 use super::phase::{GapRecovery, Tracking};
-use crate::estimation::consider::ConsiderCovariance;
-use crate::estimation::views::Views;
-use crate::estimation::window::Window;
-use crate::estimation::{EstimationError, WarningKind};
+use crate::consider::ConsiderCovariance;
+use crate::views::Views;
+use crate::window::Window;
+use crate::{EstimationError, WarningKind};
 
 impl Estimator {
     /// Localises a full window, if a search is pending; returns whether the window moved.

@@ -14,16 +14,16 @@ mod tracking;
 use self::diagnostics::Diagnostics;
 use self::gauge::GaugeBuilder;
 use self::phase::{Phase, Tracking};
-use crate::estimation::consider::{ConsiderCovariance, StartMatrix};
-use crate::estimation::intake::{Intake, Segment};
-use crate::estimation::local_map::LocalMap;
-use crate::estimation::localisation::MapLocalisation;
-use crate::estimation::observed::ObservedSurfels;
-use crate::estimation::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WindowReport};
-use crate::geometry::{Pose, Trajectory, Vector};
-use crate::measurement::{Calibration, Measurement};
-use crate::surfel_map::SurfelMap;
-use crate::time::Stamp;
+use crate::consider::{ConsiderCovariance, StartMatrix};
+use crate::intake::{Intake, Segment};
+use crate::local_map::LocalMap;
+use crate::localisation::MapLocalisation;
+use crate::observed::ObservedSurfels;
+use crate::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WindowReport};
+use zsim_base::geometry::{Pose, Trajectory, Vector};
+use zsim_base::measurement::{Calibration, Measurement};
+use zsim_base::surfel_map::SurfelMap;
+use zsim_base::time::Stamp;
 
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///

@@ -1,16 +1,16 @@
 //! The phases of the estimator: without and with a window.
 
 use super::sensed::SensedMotion;
-use crate::estimation::coasting::Coasting;
-use crate::estimation::consider::Sensitivity;
-use crate::estimation::initial::StateBeforeGap;
-use crate::estimation::intake::Segment;
-use crate::estimation::localisation::GapRelocalisation;
-use crate::estimation::strapdown::Interval;
-use crate::estimation::surfel::TimedReturn;
-use crate::estimation::window::Window;
-use crate::time::Stamp;
+use crate::coasting::Coasting;
+use crate::consider::Sensitivity;
+use crate::initial::StateBeforeGap;
+use crate::intake::Segment;
+use crate::localisation::GapRelocalisation;
+use crate::strapdown::Interval;
+use crate::surfel::TimedReturn;
+use crate::window::Window;
 use std::collections::VecDeque;
+use zsim_base::time::Stamp;
 
 /// The phase of the estimator; an IMU gap or a long lidar gap leads from tracking back to gathering.
 #[derive(Debug)]

@@ -2,10 +2,10 @@
 
 use super::Estimator;
 use super::phase::{Phase, Tracking};
-use crate::estimation::EstimatedPose;
-use crate::estimation::window::Window;
-use crate::geometry::{Pose, Rotation};
-use crate::time::{Span, Stamp};
+use crate::EstimatedPose;
+use crate::window::Window;
+use zsim_base::geometry::{Pose, Rotation};
+use zsim_base::time::{Span, Stamp};
 
 impl Estimator {
     /// The poses after `after` up to the end of the window, at whole multiples of the IMU period, as estimated so far.

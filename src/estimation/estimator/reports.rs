@@ -1,9 +1,9 @@
 //! Reports on solved windows.
 
-use crate::estimation::spec::SolveSpec;
-use crate::estimation::window::{Window, WindowSolution};
-use crate::estimation::{WarningKind, WindowReport};
-use crate::time::Stamp;
+use crate::spec::SolveSpec;
+use crate::window::{Window, WindowSolution};
+use crate::{WarningKind, WindowReport};
+use zsim_base::time::Stamp;
 
 /// The report on the solution of the window that ends at `stamp`.
 ///

@@ -1,9 +1,9 @@
 //! The motion that the sensors measured, without the influence of fixed views: input of the registration.
 
-use crate::estimation::observed::{MotionByViews, ObservedSurfels};
-use crate::estimation::window::{Linearised, LocalMotion, Window};
-use crate::geometry::Pose;
+use crate::observed::{MotionByViews, ObservedSurfels};
+use crate::window::{Linearised, LocalMotion, Window};
 use std::collections::VecDeque;
+use zsim_base::geometry::Pose;
 
 /// The motion is taken from this part of the window: in the middle it has most matches on both sides.
 const MIDDLE: f64 = 0.5;

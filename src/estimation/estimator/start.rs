@@ -3,19 +3,19 @@
 use super::Estimator;
 use super::phase::{GapRecovery, Gathering, Phase, Tracking};
 use super::sensed::SensedMotion;
-use crate::estimation::border::Border;
-use crate::estimation::clock::Clock;
-use crate::estimation::consider::ConsiderCovariance;
-use crate::estimation::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
-use crate::estimation::intake::Segment;
-use crate::estimation::local_map::LocalMap;
-use crate::estimation::standstill::{Standstill, standstill};
-use crate::estimation::strapdown::Interval;
-use crate::estimation::surfel::SurfelBuilder;
-use crate::estimation::window::{Window, WindowSolution};
-use crate::estimation::{EstimatorSpec, WarningKind};
-use crate::geometry::Vector;
-use crate::time::Stamp;
+use crate::border::Border;
+use crate::clock::Clock;
+use crate::consider::ConsiderCovariance;
+use crate::initial::{self, InitialState, NoiseFactors, StateBeforeGap};
+use crate::intake::Segment;
+use crate::local_map::LocalMap;
+use crate::standstill::{Standstill, standstill};
+use crate::strapdown::Interval;
+use crate::surfel::SurfelBuilder;
+use crate::window::{Window, WindowSolution};
+use crate::{EstimatorSpec, WarningKind};
+use zsim_base::geometry::Vector;
+use zsim_base::time::Stamp;
 
 /// An estimated noise above the specification by more than this factor causes a warning.
 const REPORTED_NOISE_FACTOR: f64 = 1.5;

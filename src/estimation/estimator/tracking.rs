@@ -3,12 +3,12 @@
 use super::Estimator;
 use super::phase::Tracking;
 use super::reports::report;
-use crate::estimation::EstimationError;
-use crate::estimation::intake::Segment;
-use crate::estimation::observed::ObservedPatch;
-use crate::estimation::timing::Stopwatch;
-use crate::estimation::window::{Linearised, Window, WindowSolution};
-use crate::time::Stamp;
+use crate::EstimationError;
+use crate::intake::Segment;
+use crate::observed::ObservedPatch;
+use crate::timing::Stopwatch;
+use crate::window::{Linearised, Window, WindowSolution};
+use zsim_base::time::Stamp;
 
 /// Speed (m/s) or rotation rate (rad/s) above which too few matches are a problem. Below both the IMU is sufficient.
 const FAST_MOTION: (f64, f64) = (0.3, 0.5);

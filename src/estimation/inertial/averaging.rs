@@ -1,8 +1,8 @@
 //! Means and slopes over the intervals of an IMU, from readings of its kind of averaging.
 
 use super::Mean;
-use crate::geometry::Vector;
-use crate::measurement::ImuAveraging;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::ImuAveraging;
 
 /// Readings whose spacings differ by less than this fraction are evenly spaced.
 const EVEN: f64 = 0.1;
@@ -15,7 +15,7 @@ const EVEN: f64 = 0.1;
 pub(super) struct Compensation {
     /// Factor of `h^2 / 24` times the second derivative, by which the mean over the interval exceeds the reading.
     curvature: f64,
-    /// See [`Interval`](crate::estimation::strapdown::Interval).
+    /// See [`Interval`](crate::strapdown::Interval).
     pub(super) uncompensated: f64,
 }
 
@@ -71,7 +71,7 @@ impl Compensation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::inertial::Clipped;
+    use crate::inertial::Clipped;
     use approx::assert_relative_eq;
 
     const H_S: f64 = 0.01;

@@ -1,7 +1,7 @@
 //! Detects clipped samples, with range limits from the data sheet or from the readings.
 
-use crate::geometry::Vector;
-use crate::measurement::{ImuNoise, ImuSample};
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::{ImuNoise, ImuSample};
 
 /// A reading within this fraction of a data sheet limit is clipped.
 const AT_LIMIT: f64 = 1e-3;
@@ -16,7 +16,7 @@ const MIN_FLAT_TOP_SAMPLES: usize = 3;
 
 /// Axes on which a sample is clipped: the magnitude of the true value is at least that of the reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(in crate::estimation) struct Clipped {
+pub(crate) struct Clipped {
     /// Axes of the gyroscope.
     pub gyro: [bool; 3],
     /// Axes of the accelerometer.

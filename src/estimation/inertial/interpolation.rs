@@ -1,7 +1,7 @@
 //! Cubic interpolation between IMU readings, and its measured error.
 
 use super::Mean;
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Initial interpolation error as a multiple of the squared gap, rad/s and m/s^2 per s^2: a head that rocks by 5 rad/s
 /// at 1.2 Hz.

@@ -1,7 +1,7 @@
 //! The mean motion between samples.
 
 use super::clipping::Clipped;
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// Samples of a faster IMU are averaged to about this spacing, s.
 pub(super) const SPACING_S: f64 = 0.01;

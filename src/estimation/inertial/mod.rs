@@ -19,14 +19,14 @@ use super::initial::NoiseFactors;
 use super::spec::InertialSpec;
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
-use crate::geometry::Vector;
-use crate::measurement::{ImuAveraging, ImuNoise, ImuSample};
 use averaging::{Compensation, Neighbours};
 use interpolation::InterpolationError;
 use recent_motion::RecentMotion;
 use reconstruction::{FIT_MEANS, bridge, reconstruct_clipped};
 use resampling::Resampler;
 use std::collections::VecDeque;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::{ImuAveraging, ImuNoise, ImuSample};
 
 /// A shorter gap of a sensor with a period is bridged whatever the motion, s.
 const SHORT_GAP_S: f64 = 0.13;

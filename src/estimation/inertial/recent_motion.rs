@@ -3,8 +3,8 @@
 use super::Mean;
 use super::interpolation::InterpolationError;
 use super::reconstruction::{FIT_MEANS, bridge};
-use crate::geometry::Rotation;
 use std::collections::VecDeque;
+use zsim_base::geometry::Rotation;
 
 /// Length of the motion that is kept, s: about two swings of the head.
 const KEPT_S: f64 = 2.0;
@@ -67,8 +67,8 @@ fn attitude_error(run: &[Mean], steps: usize, spacing_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::inertial::clipping::Clipped;
-    use crate::geometry::Vector;
+    use crate::inertial::clipping::Clipped;
+    use zsim_base::geometry::Vector;
 
     /// Error of bridging 0.2 s of a sinusoidal rotation about one axis with an amplitude of 3 rad/s.
     fn error_at(frequency_hz: f64) -> f64 {

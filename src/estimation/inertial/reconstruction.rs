@@ -3,7 +3,7 @@
 use super::Mean;
 use super::clipping::Clipped;
 use super::interpolation::{InterpolationError, between, hermite, slope};
-use crate::geometry::{Rotation, Vector};
+use zsim_base::geometry::{Rotation, Vector};
 
 /// Number of means on each side of a gap to which a line is fitted.
 pub(super) const FIT_MEANS: usize = 5;

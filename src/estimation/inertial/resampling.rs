@@ -87,8 +87,8 @@ impl Resampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::inertial::Clipped;
-    use crate::geometry::Vector;
+    use crate::inertial::Clipped;
+    use zsim_base::geometry::Vector;
 
     /// Rate and force of a head that rocks at 1.2 Hz, with a second component at 3.1 Hz.
     fn signal(t_s: f64) -> (Vector, Vector) {

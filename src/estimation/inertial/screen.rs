@@ -1,11 +1,11 @@
 //! Screens IMU samples before integration: outliers, frozen readings, clipped axes.
 
 use super::clipping::{Clipped, RangeLimits};
-use crate::geometry::Vector;
-use crate::measurement::{ImuNoise, ImuSample};
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::{ImuNoise, ImuSample};
 
 /// Length of the later data that the screening of a sample uses, s. The intake queues at least as much.
-pub(in crate::estimation) const LOOKAHEAD_S: f64 = 0.1;
+pub(crate) const LOOKAHEAD_S: f64 = 0.1;
 /// Larger readings are implausible on a moving head, rad/s and m/s^2.
 const IMPLAUSIBLE: (f64, f64) = (100.0, 5000.0);
 /// Outlier gate of the gyroscope, rad/s.
@@ -34,7 +34,7 @@ impl OutlierGate {
 
 /// Result of screening a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::estimation) enum Screened {
+pub(crate) enum Screened {
     /// A measurement, with the clipped axes.
     Measured(Clipped),
     /// Far from both neighbours, implausibly large, or not finite.
@@ -49,7 +49,7 @@ pub(in crate::estimation) enum Screened {
 
 /// Screens samples in order of time.
 #[derive(Debug)]
-pub(in crate::estimation) struct Screen {
+pub(crate) struct Screen {
     limits: RangeLimits,
     /// The two previous measurements, the later one first.
     before: [Option<ImuSample>; 2],
@@ -69,13 +69,13 @@ fn is_same_reading(a: &ImuSample, b: &ImuSample) -> bool {
 }
 
 impl Screen {
-    pub(in crate::estimation) fn new(noise: &ImuNoise) -> Self {
+    pub(crate) fn new(noise: &ImuNoise) -> Self {
         Self { limits: RangeLimits::new(noise), before: [None; 2], reading: None }
     }
 
     /// Screens the sample stamped `seconds`. `ahead` has the later samples in order; those within [`LOOKAHEAD_S`] are
     /// used.
-    pub(in crate::estimation) fn screen<'a>(
+    pub(crate) fn screen<'a>(
         &mut self,
         seconds: f64,
         sample: &ImuSample,
@@ -175,7 +175,7 @@ fn median(samples: &[&ImuSample], of: fn(&ImuSample) -> Vector) -> Option<Vector
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time::Stamp;
+    use zsim_base::time::Stamp;
 
     /// Ten seconds of a head that swings with 5 rad/s at 1.2 Hz, with noise from a linear congruential generator.
     fn samples() -> Vec<(f64, ImuSample)> {

@@ -16,9 +16,9 @@ use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::surfel::TimedReturn;
 use super::{Discarded, EstimationError, Warning, WarningKind};
-use crate::measurement::{Calibration, Measurement};
-use crate::signal::Regularity;
-use crate::time::{Span, Stamp};
+use zsim_base::measurement::{Calibration, Measurement};
+use zsim_base::signal::Regularity;
+use zsim_base::time::{Span, Stamp};
 
 /// Measurements that arrive out of order by up to this are sorted, s.
 const MAX_DISORDER_S: f64 = 0.1;

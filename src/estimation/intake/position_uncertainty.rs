@@ -1,6 +1,6 @@
 //! Uncertainty of the position while only the IMU is available.
 
-use crate::estimation::strapdown::Interval;
+use crate::strapdown::Interval;
 
 /// Above this standard deviation of the position (m) a window of dead reckoning cannot be matched with the map again.
 const MAX_SIGMA_M: f64 = 0.3;

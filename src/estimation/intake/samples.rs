@@ -1,10 +1,10 @@
 //! IMU input: queues and screens samples, and converts them to intervals.
 
-use crate::estimation::inertial::{InertialStream, Screen, Screened};
-use crate::estimation::initial::NoiseFactors;
-use crate::estimation::strapdown::Interval;
-use crate::measurement::{ImuNoise, ImuSample};
+use crate::inertial::{InertialStream, Screen, Screened};
+use crate::initial::NoiseFactors;
+use crate::strapdown::Interval;
 use std::collections::VecDeque;
+use zsim_base::measurement::{ImuNoise, ImuSample};
 
 /// Margin of the IMU intervals on both sides of a segment, s: room for a change of the clock offset.
 pub(super) const MARGIN_S: f64 = 0.05;

@@ -1,14 +1,14 @@
 //! Lidar input: queues scans, discards frozen ones, and converts them to returns with smoothed times.
 
-use crate::estimation::EstimationError;
-use crate::estimation::scan_geometry::{ScanGeometry, is_in_plane};
-use crate::estimation::spec::EstimatorSpec;
-use crate::estimation::stamps::StampFilter;
-use crate::estimation::surfel::TimedReturn;
-use crate::geometry::Pose;
-use crate::measurement::{Calibration, LidarScan};
-use crate::signal::Regularity;
+use crate::EstimationError;
+use crate::scan_geometry::{ScanGeometry, is_in_plane};
+use crate::spec::EstimatorSpec;
+use crate::stamps::StampFilter;
+use crate::surfel::TimedReturn;
 use std::collections::VecDeque;
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::{Calibration, LidarScan};
+use zsim_base::signal::Regularity;
 
 /// A scan that repeats the previous one for this many times is frozen: noise changes some range of a working lidar.
 const FROZEN_REPEATS: usize = 2;

@@ -1,7 +1,7 @@
 //! Error bound of a pose.
 
-use crate::geometry::{Matrix, PoseCovariance};
-use crate::signal::chi_squared_quantile;
+use zsim_base::geometry::{Matrix, PoseCovariance};
+use zsim_base::signal::chi_squared_quantile;
 
 /// Probability that a position is within the bound.
 const PROBABILITY: f64 = 0.99;
@@ -33,9 +33,9 @@ pub fn covariance_blocks(covariance: &PoseCovariance) -> (Matrix, Matrix) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
+    use zsim_base::geometry::Vector;
 
     #[test]
     fn the_radius_is_the_textbook_quantile_where_eigenvalues_are_equal_or_single() {

@@ -1,8 +1,8 @@
 //! Tests of the estimator's assumptions: findings, and factors on the error bound.
 
 use super::finding::{Cause, Finding, Status};
-use crate::estimation::{Discarded, Warning, WarningKind, WindowReport};
-use crate::time::{Span, Stamp};
+use crate::{Discarded, Warning, WarningKind, WindowReport};
+use zsim_base::time::{Span, Stamp};
 
 /// If more than this fraction of the samples is clipped, a loss of tracking is attributed to it.
 const LOST_CLIPPED_FRACTION: f64 = 0.02;
@@ -351,7 +351,7 @@ fn ill_conditioned(windows: &[WindowReport], of: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::Timing;
+    use crate::Timing;
 
     /// Windows of a sound run, two per second.
     fn sound(count: usize) -> Vec<WindowReport> {

@@ -1,7 +1,7 @@
 //! Findings about a run, and their effect on the result.
 
-use crate::time::Stamp;
 use std::fmt;
+use zsim_base::time::Stamp;
 
 /// Status of a result, best first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]

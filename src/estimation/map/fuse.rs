@@ -1,7 +1,7 @@
 //! Fuses surfels of the same surface: same cell, similar normals, coplanar.
 
-use crate::geometry::{Matrix, Vector};
-use crate::surfel_map::MapSurfel;
+use zsim_base::geometry::{Matrix, Vector};
+use zsim_base::surfel_map::MapSurfel;
 
 /// Maximum angle between the normals of one surface, degrees.
 const MAX_NORMAL_ANGLE_DEG: f64 = 15.0;

@@ -8,11 +8,11 @@
 use super::limits::{MAP_LIMITS, RelocalisationLimits};
 use super::localised_pose::{LocalisedPose, offset_pose, pose_distance};
 use super::relocaliser::{Relocaliser, is_different_pose};
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Pose, Vector};
+use crate::surfel::Patch;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::f64::consts::{FRAC_PI_4, TAU};
+use zsim_base::geometry::{Pose, Vector};
 
 /// Edge of the grid cells, m: the correlation tolerates about one cell of error.
 const CELL_M: f64 = 0.5;
@@ -134,7 +134,7 @@ fn directions(normal: &Vector) -> (u16, u16) {
 
 impl Relocaliser {
     /// Returns a pose of `query`, observed from the point `from`, that matches clearly better than `found`.
-    pub(in crate::estimation) fn find_better_elsewhere(
+    pub(crate) fn find_better_elsewhere(
         &self,
         query: &[Patch],
         from: &Vector,
@@ -149,7 +149,7 @@ impl Relocaliser {
     ///
     /// # Errors
     /// The distance of the other pose.
-    pub(in crate::estimation) fn refuse_ambiguous(
+    pub(crate) fn refuse_ambiguous(
         &self,
         query: &[Patch],
         from: &Vector,

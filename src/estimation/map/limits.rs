@@ -1,7 +1,7 @@
 //! Search region and acceptance thresholds of the relocalisation.
 
 use super::localised_pose::{LocalisedPose, offset_pose, pose_distance};
-use crate::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Vector};
 
 /// Spacing of the start poses, m and rad: within half of it the coarsest surfels converge.
 const START_SPACING: (f64, f64) = (0.7, 14.0 / 180.0 * std::f64::consts::PI);
@@ -22,7 +22,7 @@ const RIVAL_REACH: (f64, f64) = (1.0, 2.0);
 
 /// Search region around an expected pose, and thresholds for accepting a pose.
 #[derive(Debug)]
-pub(in crate::estimation) struct RelocalisationLimits {
+pub(crate) struct RelocalisationLimits {
     /// Horizontal distance, m, and heading, rad, from the expected pose.
     reach: (f64, f64),
     /// Vertical distance of the start poses from the expected pose, m.
@@ -77,7 +77,7 @@ impl Evidence {
 const MAX_RESIDUAL_M: f64 = 0.01;
 
 /// Limits in a complete map: the starts cover the convergence range of the coarsest surfels, 1 m and 20 degrees.
-pub(in crate::estimation) const MAP_LIMITS: RelocalisationLimits = RelocalisationLimits {
+pub(crate) const MAP_LIMITS: RelocalisationLimits = RelocalisationLimits {
     reach: START_SPACING,
     reach_up_m: 0.0,
     gate_m: None,
@@ -94,7 +94,7 @@ impl RelocalisationLimits {
     /// Limits for the surfels observed before a gap of `seconds`; `sigma_m` is the standard deviation of a match.
     ///
     /// The two sets of surfels may overlap little, but where they overlap they must agree. The head cannot have gone far.
-    pub(in crate::estimation) fn after_gap(seconds: f64, sigma_m: f64) -> Self {
+    pub(crate) fn after_gap(seconds: f64, sigma_m: f64) -> Self {
         let reach_m = (GAP_RADIUS.0 + GAP_RADIUS.1 * seconds).min(GAP_RADIUS.2);
         let reach_deg = (GAP_HEADING_DEG.0 + GAP_HEADING_DEG.1 * seconds).min(GAP_HEADING_DEG.2);
         let is_long = seconds > LONG_GAP_S;
@@ -113,7 +113,7 @@ impl RelocalisationLimits {
     }
 
     /// Limits after a lidar gap that the IMU bridged, which predicts the position to `predicted_sigma_m` and the heading.
-    pub(in crate::estimation) fn after_coasting(predicted_sigma_m: f64, sigma_m: f64) -> Self {
+    pub(crate) fn after_coasting(predicted_sigma_m: f64, sigma_m: f64) -> Self {
         let reach_m = (GAP_RADIUS.0 + 2.0 * predicted_sigma_m).min(GAP_RADIUS.2);
         Self {
             reach: (reach_m, GAP_HEADING_DEG.0.to_radians()),

@@ -1,7 +1,7 @@
 //! Pose of observed surfels in a map, and distances between poses.
 
-use crate::geometry::{Pose, Rotation, Vector};
 use nalgebra::{Matrix6, Vector6};
+use zsim_base::geometry::{Pose, Rotation, Vector};
 
 /// Pose of a query found in a map.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,15 +11,15 @@ pub struct LocalisedPose {
     /// Fraction of the finest query surfels that match the map.
     pub inlier_ratio: f64,
     /// Number of the finest query surfels that match the map.
-    pub(in crate::estimation) matched: usize,
+    pub(crate) matched: usize,
     /// Fraction of matches among the surfels with a neighbour in the map.
-    pub(in crate::estimation) agreement: f64,
+    pub(crate) agreement: f64,
     /// Root mean square distance of the matches along the normals, m.
     pub residual_rms_m: f64,
     /// Covariance of a rotation about the viewpoint (rad) and a translation (m), in map axes.
-    pub(in crate::estimation) covariance: Matrix6<f64>,
+    pub(crate) covariance: Matrix6<f64>,
     /// Distance that the true position may be from this one because another pose matches too, m.
-    pub(in crate::estimation) ambiguity_m: f64,
+    pub(crate) ambiguity_m: f64,
 }
 
 /// Poses with at least this fraction of the best score may be the true one.

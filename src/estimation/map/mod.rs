@@ -13,10 +13,10 @@ pub(super) use relocaliser::Relocaliser;
 use super::observed::{ObservedSurfel, ObservedSurfels};
 use super::surfel::Patch;
 use super::{EstimationError, EstimatorSpec, RegistrationSpec};
-use crate::geometry::{Matrix, Pose, PoseCovariance, Trajectory, Vector, skew};
-use crate::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
-use crate::time::{Span, Stamp};
 use nalgebra::Matrix6;
+use zsim_base::geometry::{Matrix, Pose, PoseCovariance, Trajectory, Vector, skew};
+use zsim_base::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
+use zsim_base::time::{Span, Stamp};
 
 /// Builds a map from the surfels `observed` in an odometry run.
 ///

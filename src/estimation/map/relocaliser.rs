@@ -7,15 +7,15 @@
 
 use super::limits::RelocalisationLimits;
 use super::localised_pose::{LocalisedPose, apply_step, pose_distance};
-use crate::estimation::matching::{Matcher, SearchTrees};
-use crate::estimation::residual::matched::MIN_SIGNIFICANT_TILT;
-use crate::estimation::residual::matched::Plane;
-use crate::estimation::spec::{MatchingSpec, SolveSpec, SurfelSpec};
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Matrix, Pose, Vector};
-use crate::surfel_map::SurfelMap;
+use crate::matching::{Matcher, SearchTrees};
+use crate::residual::matched::MIN_SIGNIFICANT_TILT;
+use crate::residual::matched::Plane;
+use crate::spec::{MatchingSpec, SolveSpec, SurfelSpec};
+use crate::surfel::Patch;
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
+use zsim_base::geometry::{Matrix, Pose, Vector};
+use zsim_base::surfel_map::SurfelMap;
 
 #[cfg(test)]
 mod tests;
@@ -50,7 +50,7 @@ const ALTERNATIVE: (f64, f64) = (0.5, 1.0);
 
 /// Finds poses in a map of patches.
 #[derive(Debug)]
-pub(in crate::estimation) struct Relocaliser {
+pub(crate) struct Relocaliser {
     matcher: Matcher,
     patches: Vec<Patch>,
     trees: SearchTrees,
@@ -86,18 +86,13 @@ struct Gate {
 
 impl Relocaliser {
     /// Relocaliser in `map`, for queries with the surfel settings `surfels`.
-    pub(in crate::estimation) fn new(
-        map: &SurfelMap,
-        matching: &MatchingSpec,
-        surfels: &SurfelSpec,
-        solve: &SolveSpec,
-    ) -> Self {
+    pub(crate) fn new(map: &SurfelMap, matching: &MatchingSpec, surfels: &SurfelSpec, solve: &SolveSpec) -> Self {
         let patches = map.surfels().iter().map(Patch::from_map_surfel).collect();
         Self::in_patches(patches, matching, surfels, solve)
     }
 
     /// Relocaliser in `patches`, which are in one frame.
-    pub(in crate::estimation) fn in_patches(
+    pub(crate) fn in_patches(
         patches: Vec<Patch>,
         matching: &MatchingSpec,
         surfels: &SurfelSpec,
@@ -118,7 +113,7 @@ impl Relocaliser {
     }
 
     /// The map's patches.
-    pub(in crate::estimation) fn patches(&self) -> &[Patch] {
+    pub(crate) fn patches(&self) -> &[Patch] {
         &self.patches
     }
 
@@ -126,7 +121,7 @@ impl Relocaliser {
     ///
     /// # Errors
     /// The reason why no pose is accepted.
-    pub(in crate::estimation) fn find(
+    pub(crate) fn find(
         &self,
         query: &[Patch],
         from: &Vector,

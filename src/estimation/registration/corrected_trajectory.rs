@@ -15,12 +15,12 @@
 
 use super::RegistrationSpec;
 use super::equations::{Equations, PairTerm, UnaryTerm};
-use crate::estimation::nominal::Correction;
-use crate::estimation::observed::MotionByViews;
-use crate::estimation::spline::Basis;
-use crate::geometry::{Pose, PoseCovariance, Rotation, Trajectory, TrajectoryError, Vector, skew};
-use crate::time::{Span, Stamp};
+use crate::nominal::Correction;
+use crate::observed::MotionByViews;
+use crate::spline::Basis;
 use nalgebra::{Matrix6, Vector6};
+use zsim_base::geometry::{Pose, PoseCovariance, Rotation, Trajectory, TrajectoryError, Vector, skew};
+use zsim_base::time::{Span, Stamp};
 
 /// Standard deviation of position, m, and heading, rad, of the first pose: it defines the map frame.
 const START_SIGMA: (f64, f64) = (1e-4, 1e-5);
@@ -311,8 +311,8 @@ fn unit(axis: usize) -> Vector6<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     fn node(seed: f64) -> Node {
         let wave = |k: f64| (seed * 1.7 + k).sin();
@@ -364,7 +364,7 @@ mod tests {
 
     #[test]
     fn the_motion_of_a_window_has_its_covariance() {
-        let spec = crate::estimation::load("default").unwrap().registration;
+        let spec = crate::load("default").unwrap().registration;
         let at = |k: i64| Stamp::from_nanos(k * 100_000_000);
         let poses = (0..41).map(|k| (at(k), Pose::translation(0.1 * k as f64, 0.0, 0.0)));
         let trajectory = Trajectory::from_poses(poses).unwrap();

@@ -4,7 +4,7 @@
 
 use super::block_matrix::BlockMatrix;
 use super::conjugate_gradients::{self, PreconditionedSystem};
-use crate::estimation::spline::Basis;
+use crate::spline::Basis;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;
 use nalgebra::{Cholesky, Const, Matrix6, SMatrix, SVector, Vector6};
@@ -243,9 +243,9 @@ impl PreconditionedSystem for LocallyPreconditioned<'_> {
 mod tests {
     use super::super::reduction::Reduction;
     use super::*;
-    use crate::geometry::Vector;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
+    use zsim_base::geometry::Vector;
 
     fn wave(k: usize) -> Vector6<f64> {
         Vector6::from_fn(|r, _| ((k * 7 + r * r * 3 + r * k) as f64 * 0.41).sin())

@@ -12,11 +12,11 @@
 //! extrinsics.
 
 use super::equations::{Shared, SharedTerm};
-use crate::estimation::EstimatorSpec;
-use crate::estimation::observed::ObservedSurfels;
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
-use crate::measurement::{Calibration, LidarCorrection};
+use crate::EstimatorSpec;
+use crate::observed::ObservedSurfels;
+use crate::surfel::Patch;
+use zsim_base::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
+use zsim_base::measurement::{Calibration, LidarCorrection};
 
 /// Largest assumed squared ratio of the median intensity to that of a surfel: limits the effect of a wrong intensity.
 const MAX_WEAKNESS: f64 = 100.0;
@@ -151,12 +151,12 @@ pub(super) fn recalibrated(
 mod tests {
     use super::super::equations::SHARED_DIMENSION;
     use super::*;
-    use crate::estimation::load;
-    use crate::estimation::observed::ObservedSurfel;
-    use crate::geometry::{Matrix, from_roll_pitch_yaw};
-    use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
-    use crate::time::{Span, Stamp};
+    use crate::load;
+    use crate::observed::ObservedSurfel;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Matrix, from_roll_pitch_yaw};
+    use zsim_base::measurement::{ImuAveraging, ImuNoise, LidarNoise};
+    use zsim_base::time::{Span, Stamp};
 
     fn calibration() -> Calibration {
         Calibration {

@@ -9,13 +9,13 @@ use super::RegistrationSpec;
 use super::equations::{Equations, PairTerm, SharedTerm, UnaryTerm};
 use super::neighbours::ActiveNeighbours;
 use super::scene::Scene;
-use crate::estimation::matching::Matcher;
-use crate::estimation::residual::matched::MIN_SIGNIFICANT_TILT;
-use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Matrix, Vector};
+use crate::matching::Matcher;
+use crate::residual::matched::MIN_SIGNIFICANT_TILT;
+use crate::residual::matched::Plane;
+use crate::surfel::Patch;
 use nalgebra::Vector6;
 use rayon::prelude::*;
+use zsim_base::geometry::{Matrix, Vector};
 
 /// Number of pairs of bins that are summed before they are distributed to the knots: bounds the memory.
 const PAIRS_AT_ONCE: usize = 4096;

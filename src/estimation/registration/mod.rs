@@ -48,9 +48,6 @@ use super::matching::Matcher;
 use super::observed::ObservedSurfels;
 use super::window::Displacement;
 use super::{EstimationError, EstimatorSpec};
-use crate::geometry::{PoseCovariance, Trajectory, Vector};
-use crate::measurement::{Calibration, LidarCorrection};
-use crate::time::Stamp;
 use corrected_trajectory::CorrectedTrajectory;
 use equations::Equations;
 use lidar_model::LidarModel;
@@ -60,6 +57,9 @@ use places::PreAligned;
 use scene::Scene;
 use sensed_motion::{combined_with_open_loop, sensed_motion};
 use trajectory_difference::largest_difference;
+use zsim_base::geometry::{PoseCovariance, Trajectory, Vector};
+use zsim_base::measurement::{Calibration, LidarCorrection};
+use zsim_base::time::Stamp;
 
 /// Maximum correction in one solve, m and rad; a larger one is rejected as implausible.
 const MAX_CORRECTION: (f64, f64) = (20.0, 1.0);

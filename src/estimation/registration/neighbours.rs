@@ -1,8 +1,8 @@
 //! Candidate matches: reciprocal nearest neighbours between two submaps, for each resolution.
 
 use super::scene::Scene;
-use crate::estimation::matching::{Matcher, SearchTrees};
-use crate::estimation::surfel::Patch;
+use crate::matching::{Matcher, SearchTrees};
+use crate::surfel::Patch;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -10,11 +10,11 @@
 //! faster than the nodes counts as impossible, so the covariance is too small by its variance.
 
 use super::equations::{Equations, SHARED_DIMENSION};
-use crate::estimation::spline::Basis;
-use crate::geometry::{Vector, skew};
+use crate::spline::Basis;
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 use nalgebra::{Matrix6, SMatrix};
+use zsim_base::geometry::{Vector, skew};
 
 /// Covariances of a correction `[dr, dt]`, rad and m.
 #[derive(Debug, Clone, Copy, PartialEq)]

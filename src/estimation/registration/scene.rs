@@ -4,13 +4,13 @@ use super::corrected_trajectory::CorrectedTrajectory;
 use super::equations::Shared;
 use super::lidar_model::{LidarModel, LidarRay, rotate_patch};
 use super::{RegistrationSpec, submaps};
-use crate::estimation::nominal::Correction;
-use crate::estimation::observed::ObservedSurfels;
-use crate::estimation::spline::Basis;
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Rotation, Vector};
+use crate::nominal::Correction;
+use crate::observed::ObservedSurfels;
+use crate::spline::Basis;
+use crate::surfel::Patch;
 use rayon::prelude::*;
 use std::ops::Range;
+use zsim_base::geometry::{Rotation, Vector};
 
 /// All surfels in time order, and the submaps to be matched.
 #[derive(Debug)]

@@ -1,10 +1,10 @@
 //! The motion that the sensors measured: the open loop without the influence of its fixed views.
 
 use super::RegistrationSpec;
-use crate::estimation::observed::MotionByViews;
-use crate::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
-use crate::time::{Span, Stamp};
+use crate::observed::MotionByViews;
 use nalgebra::{Matrix6, Vector6};
+use zsim_base::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};
+use zsim_base::time::{Span, Stamp};
 
 /// The open loop with the influence of the views removed from its motion; it drifts as an open loop without views.
 ///
@@ -100,7 +100,7 @@ impl<'a> HeadMotion<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     /// A walk with a change of direction; `bent` has a motion of its own between 1 and 3 s.
     fn pose(t_s: f64, bent: bool) -> Pose {
@@ -126,7 +126,7 @@ mod tests {
         let changes: Vec<MotionByViews> = (1..9).map(change).collect();
         let (open_loop, expected) = (trajectory(true), trajectory(false));
         // Certain motion without views is used as it is, uncertain motion not at all.
-        let spec = crate::estimation::load("default").unwrap().registration;
+        let spec = crate::load("default").unwrap().registration;
         let combined = |changes: &[MotionByViews]| combined_with_open_loop(changes, &open_loop, stamp(0), &spec);
         let uncertain: Vec<MotionByViews> =
             changes.iter().map(|c| MotionByViews { covariance_per_s: Matrix6::identity() * 1e6, ..*c }).collect();

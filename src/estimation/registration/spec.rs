@@ -1,6 +1,6 @@
 use super::PlacesSpec;
-use crate::estimation::EstimationError;
-use crate::estimation::surfel_spec::{MatchingSpec, SurfelSpec};
+use crate::EstimationError;
+use crate::surfel_spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
 
 /// Global registration (loop-closed trajectory) settings.
@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct RegistrationSpec {
     /// Spacing of the knots of the correction spline, s.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub knot_spacing_s: f64,
     /// Edge of the finest voxels, m.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub finest_voxel_m: f64,
     /// Number of resolutions; each has double the voxel edge of the previous one.
     pub levels: usize,
@@ -19,17 +19,17 @@ pub struct RegistrationSpec {
     pub min_points: usize,
     /// Minimum planarity of a surfel, 0 to 1. With 0 it may be a line: the normal of a match is that of both surfels
     /// together, and two lines on one surface determine it.
-    #[serde(default, with = "crate::spec::checked::Fraction")]
+    #[serde(default, with = "zsim_base::spec::checked::Fraction")]
     pub min_planarity: f64,
     /// Number of points from which on a surfel has its full weight; with fewer, its variance along the normal counts in
     /// inverse proportion to the number. 0: all have their full weight.
     #[serde(default)]
     pub full_weight_points: usize,
     /// Maximum duration of a surfel, s; points of a cell that span more are split.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub max_duration_s: f64,
     /// Duration of a submap, s; surfels are matched between pairs of submaps.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub chapter_s: f64,
     /// Number of reference submaps that must observe each cell; all submaps are matched with references. More references
     /// give more matches and longer computing times.
@@ -40,56 +40,56 @@ pub struct RegistrationSpec {
     pub neighbours: usize,
     /// Maximum distance along the normal of a match at the finest resolution, m; while coarser resolutions are registered
     /// it is larger in proportion to the voxel edge.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub max_plane_distance_m: f64,
     /// Threshold of the Cauchy kernel, in standard deviations.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub cauchy: f64,
     /// Standard deviation of a match in addition to surfel thickness, m.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub match_sigma_m: f64,
     /// Weight of all matches of a surfel together, relative to one independent match: errors of matches are correlated.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub match_weight: f64,
     /// Prior standard deviation of the range bias of an echo of median intensity, m; the bias is inversely proportional to the
     /// square of the intensity. 0 to estimate none.
-    #[serde(with = "crate::spec::checked::NonNegative")]
+    #[serde(with = "zsim_base::spec::checked::NonNegative")]
     pub weak_bias_sigma_m: f64,
     /// Correlation time of the open-loop error, s; the size of the error is that of the open-loop covariance.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub correlation_s: f64,
     /// Random walk of the position of the open loop by errors that views repeat, m/sqrt(s); with the covariance of the motion
     /// without views it determines how much of that motion is used.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub view_drift_m_per_sqrt_s: f64,
     /// Random walk of the attitude of the open loop by errors that views repeat, degrees/sqrt(s).
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub view_turn_deg_per_sqrt_s: f64,
     /// Random walk of the open-loop position in addition to the covariance, m/sqrt(s).
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub drift_m_per_sqrt_s: f64,
     /// Random walk of the open-loop attitude in addition to the covariance, degrees/sqrt(s).
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub turn_deg_per_sqrt_s: f64,
     /// Standard deviation of the open-loop roll and pitch relative to gravity, degrees.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub level_sigma_deg: f64,
     /// Maximum number of iterations of match and solve per resolution.
     pub max_iterations: usize,
     /// Convergence threshold: iterations end when no knot moves by more than this, m.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub settled_m: f64,
     /// The geometry is weak if the smallest over the largest eigenvalue of the position information of the matches is below
     /// this, 0..1.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub weak_conditioning: f64,
     /// Minimum time between the two surfels of a match that counts as a revisit, s; shorter ones are already used by the
     /// windows of the open loop.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub again_after_s: f64,
     /// Minimum fraction of the information along a weak direction due to revisits, 0..1; with less, the
     /// registration is rejected, because the IMU constrains that direction better in the open loop.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub min_seen_again: f64,
     /// Loop closure by place recognition.
     pub places: PlacesSpec,
@@ -97,7 +97,7 @@ pub struct RegistrationSpec {
 
 impl RegistrationSpec {
     /// Surfel settings of the registration; the others equal `open_loop`.
-    pub(in crate::estimation) fn surfels(&self, open_loop: &SurfelSpec) -> SurfelSpec {
+    pub(crate) fn surfels(&self, open_loop: &SurfelSpec) -> SurfelSpec {
         SurfelSpec {
             finest_voxel_m: self.finest_voxel_m,
             levels: self.levels,
@@ -114,7 +114,7 @@ impl RegistrationSpec {
     }
 
     /// Checks the ranges of the counts.
-    pub(in crate::estimation) fn check(&self) -> Result<(), EstimationError> {
+    pub(crate) fn check(&self) -> Result<(), EstimationError> {
         let require = |is_right: bool, key: &'static str, message: &str| {
             let message = message.to_owned();
             if is_right { Ok(()) } else { Err(EstimationError::Setting { key, message }) }

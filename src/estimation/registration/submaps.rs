@@ -6,8 +6,8 @@
 //! the other submaps are linked to references and to their neighbours in time only, and the equations stay sparse.
 
 use super::RegistrationSpec;
-use crate::estimation::surfel::Patch;
-use crate::estimation::views::cells_of;
+use crate::surfel::Patch;
+use crate::views::cells_of;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -85,7 +85,7 @@ fn bit_reversed_order(count: usize) -> impl Iterator<Item = usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Matrix, Vector};
+    use zsim_base::geometry::{Matrix, Vector};
 
     #[test]
     fn bit_reversed_order_is_a_permutation_with_spread_prefixes() {
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn every_submap_is_matched_with_itself_and_with_those_that_observe_the_same() {
-        let spec = crate::estimation::load("default").unwrap().registration;
+        let spec = crate::load("default").unwrap().registration;
         let patch = |x_m: f64| Patch {
             centre: Vector::new(x_m, 0.0, 0.0),
             normal: Vector::z(),

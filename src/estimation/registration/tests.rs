@@ -3,14 +3,14 @@
 use super::equations::Shared;
 use super::matches::BinPairSums;
 use super::*;
-use crate::estimation::load;
-use crate::estimation::observed::{LidarCorrectionPeriod, MotionByViews, ObservedSurfel};
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Matrix, Pose, Rotation, from_roll_pitch_yaw};
-use crate::measurement::{ImuAveraging, ImuNoise, LidarNoise};
+use crate::load;
+use crate::observed::{LidarCorrectionPeriod, MotionByViews, ObservedSurfel};
+use crate::surfel::Patch;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use zsim_base::geometry::{Matrix, Pose, Rotation, from_roll_pitch_yaw};
+use zsim_base::measurement::{ImuAveraging, ImuNoise, LidarNoise};
 
 const DURATION_S: f64 = 40.0;
 const LASER_IN_HEAD: Vector = Vector::new(0.03, -0.02, 0.08);

@@ -1,6 +1,6 @@
 //! Difference of two trajectories.
 
-use crate::geometry::Trajectory;
+use zsim_base::geometry::Trajectory;
 
 /// Largest difference of two trajectories at the same stamps, m and rad.
 pub(super) fn largest_difference(from: &Trajectory, to: &Trajectory) -> (f64, f64) {

@@ -11,10 +11,10 @@
 use super::corrected_trajectory::CorrectedTrajectory;
 use super::equations::Equations;
 use super::reduction::{CorrectionCovariance, Reduction, carried};
-use crate::estimation::spline::Basis;
-use crate::geometry::{PoseCovariance, Vector};
-use crate::time::Stamp;
+use crate::spline::Basis;
 use nalgebra::Matrix6;
+use zsim_base::geometry::{PoseCovariance, Vector};
+use zsim_base::time::Stamp;
 
 /// At most this many poses have a covariance from the equations; those between them are interpolated.
 const MAX_EPOCHS: usize = 100;

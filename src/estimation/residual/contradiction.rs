@@ -1,8 +1,8 @@
 //! Contradiction between the IMU measurements and a trajectory.
 
 use super::imu_residual::Inertial;
-use crate::estimation::strapdown::{Biases, Interval, State};
-use crate::geometry::Vector;
+use crate::strapdown::{Biases, Interval, State};
+use zsim_base::geometry::Vector;
 
 /// Rotations and velocities are summed over this interval, s, which averages the noise of single samples.
 const SUM_INTERVAL_S: f64 = 0.2;
@@ -35,12 +35,7 @@ impl SummedResidual {
 ///
 /// The median over spans of the rotation or of the velocity residual, the larger of the two; about 1 for consistent
 /// data.
-pub(in crate::estimation) fn contradiction(
-    states: &[State],
-    intervals: &[Interval],
-    biases: &Biases,
-    gravity: &Vector,
-) -> f64 {
+pub(crate) fn contradiction(states: &[State], intervals: &[Interval], biases: &Biases, gravity: &Vector) -> f64 {
     let (mut sum, mut times) = (SummedResidual::default(), [Vec::new(), Vec::new()]);
     for (ends, interval) in states.windows(2).zip(intervals) {
         sum.add(&Inertial::between(&ends[0], &ends[1], interval, biases, gravity), interval);
@@ -59,10 +54,10 @@ pub(in crate::estimation) fn contradiction(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::gravity_in_world;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
+    use zsim_base::geometry::gravity_in_world;
 
     /// Forty seconds of an IMU under rotation and vibration, and the states integrated from it.
     fn run(biases: &Biases, gravity: &Vector) -> (Vec<State>, Vec<Interval>) {

@@ -2,10 +2,10 @@
 
 use super::rows::{KNOTS, ResidualRow, ResidualSums};
 use super::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
-use crate::estimation::normal_equations::NormalEquations;
-use crate::estimation::spline::Basis;
-use crate::estimation::strapdown::{Biases, Interval, State};
-use crate::geometry::{Matrix, Rotation, Vector, skew};
+use crate::normal_equations::NormalEquations;
+use crate::spline::Basis;
+use crate::strapdown::{Biases, Interval, State};
+use zsim_base::geometry::{Matrix, Rotation, Vector, skew};
 
 /// Intervals whose sigmas differ by more than this factor are not put into one sum.
 const MAX_SIGMA_RATIO: f64 = 3.0;

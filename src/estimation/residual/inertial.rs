@@ -23,10 +23,10 @@
 use super::Layout;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial};
 use super::rows::ResidualSums;
-use crate::estimation::normal_equations::NormalEquations;
-use crate::estimation::spline::Basis;
-use crate::estimation::strapdown::{Biases, Interval, State};
-use crate::geometry::Vector;
+use crate::normal_equations::NormalEquations;
+use crate::spline::Basis;
+use crate::strapdown::{Biases, Interval, State};
+use zsim_base::geometry::Vector;
 
 /// Factor on the sigma of a single accelerometer sample, because the correction cannot follow it within a knot span.
 /// Without the single samples the correction could oscillate between the ends of the sums.
@@ -34,7 +34,7 @@ const SINGLE_SAMPLE_FACTOR: f64 = 3.0;
 
 /// IMU gaps up to this length, s, cause no significant velocity step, and the predicted pose stays within the match
 /// gate.
-pub(in crate::estimation) const SHORT_GAP_S: f64 = 0.05;
+pub(crate) const SHORT_GAP_S: f64 = 0.05;
 /// An interval with larger sigmas than these, rad/s and m/s^2, is weakly measured.
 const WEAK: (f64, f64) = (0.3, 1.0);
 /// Uncertainty after a run of weakly measured intervals above which the correction may have a step, rad and m/s.
@@ -46,11 +46,11 @@ const STEP_MARGIN_SIGMA: (f64, f64) = (0.5, 3.0);
 
 /// The nodes of the trajectory that a window corrects, and the IMU intervals between them.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Nodes<'a> {
-    pub(in crate::estimation) states: &'a [State],
+pub(crate) struct Nodes<'a> {
+    pub(crate) states: &'a [State],
     /// The spline basis at each state.
-    pub(in crate::estimation) bases: &'a [Basis],
-    pub(in crate::estimation) intervals: &'a [Interval],
+    pub(crate) bases: &'a [Basis],
+    pub(crate) intervals: &'a [Interval],
 }
 
 /// Adds the residuals of the intervals between `nodes` to the equations.
@@ -61,7 +61,7 @@ pub(in crate::estimation) struct Nodes<'a> {
 /// freeze the bias at any value. Therefore velocities have full weight when summed from the middle of one knot span to
 /// the next, and single samples have less ([`SINGLE_SAMPLE_FACTOR`]). Where sigmas change, for example at a dropout, a new sum
 /// starts, so that the accurate samples retain their weight.
-pub(in crate::estimation) fn add_inertial(
+pub(crate) fn add_inertial(
     equations: &mut NormalEquations,
     layout: &Layout,
     nodes: &Nodes<'_>,
@@ -131,15 +131,15 @@ pub(super) fn with_step_margin(interval: &Interval) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::nominal::Correction;
-    use crate::estimation::normal_equations::Factor;
-    use crate::estimation::residual::prior::Start;
-    use crate::estimation::residual::{ACCEL_BIAS, ACCEL_MATRIX, BORDER, GRAVITY, GYRO_BIAS, GYRO_MATRIX};
-    use crate::estimation::strapdown::ImuScaleMisalignment;
-    use crate::geometry::{Matrix, Rotation, from_roll_pitch_yaw, gravity_in_world};
+    use crate::nominal::Correction;
+    use crate::normal_equations::Factor;
+    use crate::residual::prior::Start;
+    use crate::residual::{ACCEL_BIAS, ACCEL_MATRIX, BORDER, GRAVITY, GYRO_BIAS, GYRO_MATRIX};
+    use crate::strapdown::ImuScaleMisalignment;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector, SVector};
     use std::f64::consts::TAU;
+    use zsim_base::geometry::{Matrix, Rotation, from_roll_pitch_yaw, gravity_in_world};
 
     const SPACING_S: f64 = 0.2;
     const H_S: f64 = 0.01;

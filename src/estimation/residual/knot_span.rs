@@ -1,6 +1,6 @@
 //! Derivatives by the four knots of a span.
 
-use crate::estimation::spline::Basis;
+use crate::spline::Basis;
 
 /// Unknowns of the four knots about a span.
 pub(super) const SPAN_UNKNOWNS: usize = 24;

@@ -11,26 +11,26 @@
 
 use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
 use super::{CLOCK, Layout, RANGE};
-use crate::estimation::spline::Basis;
-use crate::estimation::surfel::{Patch, PlacedSurfel, Sighting};
-use crate::geometry::{Matrix, Vector};
+use crate::spline::Basis;
+use crate::surfel::{Patch, PlacedSurfel, Sighting};
+use zsim_base::geometry::{Matrix, Vector};
 
 /// The common plane of two matched surfels.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Plane {
+pub(crate) struct Plane {
     /// Unit normal of the surface.
-    pub(in crate::estimation) normal: Vector,
+    pub(crate) normal: Vector,
     /// From the second centre to the first, m.
     offset: Vector,
     /// Distance along the normal, m.
-    pub(in crate::estimation) distance_m: f64,
+    pub(crate) distance_m: f64,
     /// Variance of that distance, m^2.
-    pub(in crate::estimation) variance: f64,
+    pub(crate) variance: f64,
 }
 
 impl Plane {
     /// The common plane of two patches; `sigma_m` is the match error in addition to the variances of the patches.
-    pub(in crate::estimation) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
+    pub(crate) fn of(a: &Patch, b: &Patch, sigma_m: f64) -> Self {
         let both = a.covariance + b.covariance;
         let start = a.normal + b.normal;
         // One step of inverse iteration from the mean normal. The adjugate is proportional to the inverse, and also
@@ -49,7 +49,7 @@ impl Plane {
     }
 
     /// Removes the component of the normal along `direction`, a unit vector.
-    pub(in crate::estimation) fn remove_component(&mut self, direction: &Vector) {
+    pub(crate) fn remove_component(&mut self, direction: &Vector) {
         let remainder = self.normal - direction * self.normal.dot(direction);
         self.normal = remainder.try_normalize(1e-3).unwrap_or(self.normal);
         self.distance_m = self.normal.dot(&self.offset);
@@ -62,18 +62,18 @@ fn adjugate(m: &Matrix) -> Matrix {
 }
 
 /// Sine of the tilt of a normal towards a direction below which the tilt may be measurement error.
-pub(in crate::estimation) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
+pub(crate) const MIN_SIGNIFICANT_TILT: f64 = 0.3;
 
 /// Common unknowns without extrinsics: clock offset, clock rate and range bias.
-pub(in crate::estimation) const COMMON_WITHOUT_EXTRINSICS: usize = 3;
+pub(crate) const COMMON_WITHOUT_EXTRINSICS: usize = 3;
 /// Index of the range bias in them.
 const RANGE_BIAS: usize = RANGE - CLOCK;
 /// Common unknowns with extrinsics: also rotation and translation of the lidar.
-pub(in crate::estimation) const COMMON: usize = 9;
+pub(crate) const COMMON: usize = 9;
 
 /// The derivatives of `e` by the unknowns of one matched surfel.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct SurfelJacobian<const B: usize> {
+pub(crate) struct SurfelJacobian<const B: usize> {
     /// By rotation and translation of the surfel.
     pub(super) own: [f64; 6],
     /// By the common unknowns, which are contiguous in the border.
@@ -83,7 +83,7 @@ pub(in crate::estimation) struct SurfelJacobian<const B: usize> {
 impl<const B: usize> SurfelJacobian<B> {
     /// The derivatives for `surfel`, with `normal` pointing towards it.
     #[inline(always)]
-    pub(in crate::estimation) fn of(surfel: &PlacedSurfel, normal: &Vector, clock_reference_s: f64) -> Self {
+    pub(crate) fn of(surfel: &PlacedSurfel, normal: &Vector, clock_reference_s: f64) -> Self {
         let rotation = surfel.arm.cross(normal);
         let later = normal.dot(&surfel.velocity);
         let mut common = [0.0; B];
@@ -100,7 +100,7 @@ impl<const B: usize> SurfelJacobian<B> {
 
     /// Adds the derivatives of a patch of a fixed view, seen as in `sighting`, by the calibration of the lidar.
     #[inline(always)]
-    pub(in crate::estimation) fn against_fixed(mut self, normal: &Vector, sighting: &Sighting) -> Self {
+    pub(crate) fn against_fixed(mut self, normal: &Vector, sighting: &Sighting) -> Self {
         self.common[RANGE_BIAS] -= normal.dot(&sighting.beam);
         if B == COMMON {
             let extrinsics = sighting.by_extrinsics(normal);
@@ -111,7 +111,7 @@ impl<const B: usize> SurfelJacobian<B> {
 
     /// Adds the other surfel's derivatives by the common unknowns.
     #[inline(always)]
-    pub(in crate::estimation) fn together_with(mut self, other: &Self) -> Self {
+    pub(crate) fn together_with(mut self, other: &Self) -> Self {
         self.common.iter_mut().zip(other.common).for_each(|(sum, term)| *sum += term);
         self
     }
@@ -120,7 +120,7 @@ impl<const B: usize> SurfelJacobian<B> {
 /// Adds the Jacobian row of a match, scaled by `scales[k]`, to column `k` of six; `side` are its derivatives by the motion of
 /// a surfel with the spline basis `basis`.
 #[inline(always)]
-pub(in crate::estimation) fn add_scaled_row(
+pub(crate) fn add_scaled_row(
     columns: &mut [Vec<f64>; 6],
     layout: &Layout,
     side: &SurfelJacobian<COMMON>,
@@ -139,12 +139,12 @@ mod tests {
     use super::super::sums::{Coupling, SpanSums, SurfelSums};
     use super::super::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION};
     use super::*;
-    use crate::estimation::nominal::Correction;
-    use crate::estimation::normal_equations::NormalEquations;
-    use crate::estimation::spline::Basis;
-    use crate::geometry::{Rotation, from_roll_pitch_yaw};
+    use crate::nominal::Correction;
+    use crate::normal_equations::NormalEquations;
+    use crate::spline::Basis;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector, DVectorView};
+    use zsim_base::geometry::{Rotation, from_roll_pitch_yaw};
 
     const AT_S: f64 = 0.5;
 

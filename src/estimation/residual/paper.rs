@@ -28,13 +28,13 @@ use super::Layout;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial, ResidualSum, offset, span_of};
 use super::inertial::{Nodes, near_steps, with_step_margin};
 use super::rows::{KNOTS, ResidualSums};
-use crate::estimation::normal_equations::NormalEquations;
-use crate::estimation::spline::Basis;
-use crate::estimation::strapdown::{Biases, Interval};
-use crate::geometry::{Matrix, Vector, skew};
+use crate::normal_equations::NormalEquations;
+use crate::spline::Basis;
+use crate::strapdown::{Biases, Interval};
+use zsim_base::geometry::{Matrix, Vector, skew};
 
 /// Adds the residuals at `nodes`, whose times are relative to the clock's reference, s.
-pub(in crate::estimation) fn add_inertial(
+pub(crate) fn add_inertial(
     equations: &mut NormalEquations,
     layout: &Layout,
     nodes: &Nodes<'_>,
@@ -120,13 +120,13 @@ fn add_basis<T>(knots: &mut [T; KNOTS], basis: &Basis, first: i64, mut add: impl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::imu_signal::ImuSignal;
-    use crate::estimation::nominal::Correction;
-    use crate::estimation::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
-    use crate::estimation::strapdown::State;
-    use crate::geometry::{Rotation, gravity_in_world};
+    use crate::imu_signal::ImuSignal;
+    use crate::nominal::Correction;
+    use crate::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
+    use crate::strapdown::State;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};
+    use zsim_base::geometry::{Rotation, gravity_in_world};
 
     const SPACING_S: f64 = 0.2;
     const H_S: f64 = 0.01;

@@ -1,20 +1,20 @@
 //! Priors of the window: the start state and the border.
 
 use super::{BORDER, LIDAR_ROTATION, Layout};
-use crate::estimation::normal_equations::NormalEquations;
-use crate::estimation::spline::Basis;
-use crate::geometry::Vector;
+use crate::normal_equations::NormalEquations;
+use crate::spline::Basis;
 use nalgebra::{Matrix6, SMatrix, SVector};
+use zsim_base::geometry::Vector;
 
 /// Prior on the correction at the start of the window, which makes it continuous with the previous window.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Start {
+pub(crate) struct Start {
     /// Start of the window, trajectory time, s.
-    pub(in crate::estimation) u_s: f64,
+    pub(crate) u_s: f64,
     /// Standard deviations of rotation and translation (rad, m), of their first (1/s) and second derivative (1/s^2).
-    pub(in crate::estimation) sigmas: [[f64; 2]; 3],
+    pub(crate) sigmas: [[f64; 2]; 3],
     /// Dependence on the lidar extrinsics, if they are estimated.
-    pub(in crate::estimation) by_lidar: Option<ByLidar>,
+    pub(crate) by_lidar: Option<ByLidar>,
 }
 
 /// Derivative of the start state by the lidar extrinsics.
@@ -25,24 +25,24 @@ pub(in crate::estimation) struct Start {
 /// The lidar measures the motion of the lidar, and constrains the IMU pose only through the extrinsics. So the start
 /// pose of the IMU is as uncertain as the extrinsics. A prior without this dependence would freeze the extrinsics at
 /// the initial value: each window would add the same information a second time.
-pub(in crate::estimation) type ByLidar = [Matrix6<f64>; 3];
+pub(crate) type ByLidar = [Matrix6<f64>; 3];
 
 impl Start {
     /// The continuation of the previous window.
     ///
     /// Pose and velocity are continuous. The acceleration is continuous only approximately, because an update of a bias
     /// estimate changes it immediately.
-    pub(in crate::estimation) fn continuing(u_s: f64) -> Self {
+    pub(crate) fn continuing(u_s: f64) -> Self {
         Self { u_s, sigmas: [[1e-5, 1e-5], [1e-4, 1e-4], [1e-2, 0.3]], by_lidar: None }
     }
 
     /// The first window: the pose is the map origin by definition, the velocity has the sigma `velocity_sigma`, m/s.
-    pub(in crate::estimation) fn first(u_s: f64, velocity_sigma: f64) -> Self {
+    pub(crate) fn first(u_s: f64, velocity_sigma: f64) -> Self {
         Self { u_s, sigmas: [[1e-5, 1e-5], [0.1, velocity_sigma], [10.0, 10.0]], by_lidar: None }
     }
 
     /// Adds the prior; `total` is the sum of the corrections of this window so far, `moved` that of the border.
-    pub(in crate::estimation) fn add_to(
+    pub(crate) fn add_to(
         &self,
         equations: &mut NormalEquations,
         layout: &Layout,
@@ -54,7 +54,7 @@ impl Start {
     }
 
     /// Removes the part of the prior that [`Self::add_to`] added for the first and second derivatives.
-    pub(in crate::estimation) fn remove_velocity(
+    pub(crate) fn remove_velocity(
         &self,
         equations: &mut NormalEquations,
         layout: &Layout,
@@ -108,7 +108,7 @@ impl Start {
 
 impl Start {
     /// The right-hand side for these corrections, rotation then translation, and their rates at the start.
-    pub(in crate::estimation) fn right_hand_side(
+    pub(crate) fn right_hand_side(
         &self,
         layout: &Layout,
         value: &[f64; 6],
@@ -134,7 +134,7 @@ impl Start {
 }
 
 /// Adds a zero-velocity measurement at a node: `v + dt' = 0`, to `sigma` (m/s).
-pub(in crate::estimation) fn add_zero_velocity(
+pub(crate) fn add_zero_velocity(
     equations: &mut NormalEquations,
     layout: &Layout,
     basis: &Basis,
@@ -145,7 +145,7 @@ pub(in crate::estimation) fn add_zero_velocity(
 }
 
 /// Adds a zero-rate measurement at a node with rate `rate` (rad/s, in the map): `w + dr' = 0`, to `sigma`.
-pub(in crate::estimation) fn add_zero_rotation_rate(
+pub(crate) fn add_zero_rotation_rate(
     equations: &mut NormalEquations,
     layout: &Layout,
     basis: &Basis,
@@ -178,7 +178,7 @@ fn add_zero_derivative(
 }
 
 /// Adds the prior of the border: `information`, with the current values `from_mean` away from the mean.
-pub(in crate::estimation) fn add_border(
+pub(crate) fn add_border(
     equations: &mut NormalEquations,
     layout: &Layout,
     information: &SMatrix<f64, BORDER, BORDER>,

@@ -3,7 +3,7 @@
 //! All samples of a knot span depend on the same unknowns, so their products are summed in one small dense block.
 
 use super::{GYRO_MATRIX, Layout, RANGE};
-use crate::estimation::normal_equations::NormalEquations;
+use crate::normal_equations::NormalEquations;
 use pulp::Arch;
 
 /// Maximum number of knots that a residual depends on.

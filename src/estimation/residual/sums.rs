@@ -6,9 +6,9 @@
 use super::knot_span::{SPAN_UNKNOWNS, add_over_knots, add_scaled, over_knots};
 use super::matched::SurfelJacobian;
 use super::{CLOCK, Layout};
-use crate::estimation::normal_equations::NormalEquations;
-use crate::estimation::spline::Basis;
-use crate::estimation::surfel::PlacedSurfel;
+use crate::normal_equations::NormalEquations;
+use crate::spline::Basis;
+use crate::surfel::PlacedSurfel;
 
 /// The terms of all matches of a surfel by the motion of that surfel.
 ///
@@ -17,7 +17,7 @@ use crate::estimation::surfel::PlacedSurfel;
 ///
 /// A surfel has several matches, and its motion depends on many unknowns: this intermediate sum keeps a match cheap.
 #[derive(Debug)]
-pub(in crate::estimation) struct SurfelSums<const B: usize> {
+pub(crate) struct SurfelSums<const B: usize> {
     square: [[f64; 6]; 6],
     common: [[f64; 6]; B],
     right: [f64; 6],
@@ -25,11 +25,11 @@ pub(in crate::estimation) struct SurfelSums<const B: usize> {
 
 impl<const B: usize> SurfelSums<B> {
     /// No match yet.
-    pub(in crate::estimation) const NONE: Self = Self { square: [[0.0; 6]; 6], common: [[0.0; 6]; B], right: [0.0; 6] };
+    pub(crate) const NONE: Self = Self { square: [[0.0; 6]; 6], common: [[0.0; 6]; B], right: [0.0; 6] };
 
     /// Adds a match with derivatives `side`.
     #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
+    pub(crate) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
         for (square, by) in self.square.iter_mut().zip(side.own) {
             add_scaled(square, &side.own, weight * by);
         }
@@ -42,17 +42,17 @@ impl<const B: usize> SurfelSums<B> {
 
 /// The terms of all matches of the surfels of a span, by their motion and by the common unknowns.
 #[derive(Debug)]
-pub(in crate::estimation) struct SpanSums<const B: usize> {
+pub(crate) struct SpanSums<const B: usize> {
     /// Up to the diagonal, by knots.
     square: [[f64; SPAN_UNKNOWNS]; SPAN_UNKNOWNS],
     by_border: [[f64; SPAN_UNKNOWNS]; B],
     right: [f64; SPAN_UNKNOWNS],
-    pub(in crate::estimation) common: CommonSums<B>,
+    pub(crate) common: CommonSums<B>,
 }
 
 impl<const B: usize> SpanSums<B> {
     /// No surfel yet.
-    pub(in crate::estimation) const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         square: [[0.0; SPAN_UNKNOWNS]; SPAN_UNKNOWNS],
         by_border: [[0.0; SPAN_UNKNOWNS]; B],
         right: [0.0; SPAN_UNKNOWNS],
@@ -61,7 +61,7 @@ impl<const B: usize> SpanSums<B> {
 
     /// Adds the terms of a surfel; `basis` is the spline basis at the time of the surfel.
     #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, own: &SurfelSums<B>, basis: &Basis) {
+    pub(crate) fn add(&mut self, own: &SurfelSums<B>, basis: &Basis) {
         let mut square = [[0.0; SPAN_UNKNOWNS]; 6];
         for (row, by_motion) in square.iter_mut().zip(&own.square) {
             add_over_knots(row, by_motion, basis);
@@ -78,7 +78,7 @@ impl<const B: usize> SpanSums<B> {
     }
 
     /// Adds the sum to the window's equations; `span` is the index of the first knot.
-    pub(in crate::estimation) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, span: i64) {
+    pub(crate) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, span: i64) {
         let (first, common) = (layout.knot(span), layout.border() + CLOCK);
         for (row, sums) in self.square.iter().enumerate() {
             equations.add_row(first + row, first, &sums[..=row]);
@@ -94,7 +94,7 @@ impl<const B: usize> SpanSums<B> {
 /// The terms of all matches by the common unknowns: `sum w b v^T`, with `b` the derivative of `e` by them, and `v` in
 /// turn `b` and `e`.
 #[derive(Debug)]
-pub(in crate::estimation) struct CommonSums<const B: usize> {
+pub(crate) struct CommonSums<const B: usize> {
     square: [[f64; B]; B],
     right: [f64; B],
 }
@@ -104,7 +104,7 @@ impl<const B: usize> CommonSums<B> {
 
     /// Adds a match; `side` has the derivatives of both surfels.
     #[inline(always)]
-    pub(in crate::estimation) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
+    pub(crate) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
         for (square, by) in self.square.iter_mut().zip(side.common) {
             add_scaled(square, &side.common, weight * by);
         }
@@ -122,15 +122,15 @@ impl<const B: usize> CommonSums<B> {
 
 /// The off-diagonal block of the matches between two spans: rows by the unknowns of the later span.
 #[derive(Debug)]
-pub(in crate::estimation) struct Coupling([[f64; SPAN_UNKNOWNS]; SPAN_UNKNOWNS]);
+pub(crate) struct Coupling([[f64; SPAN_UNKNOWNS]; SPAN_UNKNOWNS]);
 
 impl Coupling {
     /// No match yet.
-    pub(in crate::estimation) const NONE: Self = Self([[0.0; SPAN_UNKNOWNS]; SPAN_UNKNOWNS]);
+    pub(crate) const NONE: Self = Self([[0.0; SPAN_UNKNOWNS]; SPAN_UNKNOWNS]);
 
     /// Adds a match of a surfel of the earlier span with one of the later.
     #[inline(always)]
-    pub(in crate::estimation) fn add<const B: usize>(
+    pub(crate) fn add<const B: usize>(
         &mut self,
         early: &PlacedSurfel,
         early_side: &SurfelJacobian<B>,
@@ -145,13 +145,7 @@ impl Coupling {
     }
 
     /// Adds the block to the window's equations; `early` and `late` are the first knots of the spans.
-    pub(in crate::estimation) fn add_to(
-        &self,
-        equations: &mut NormalEquations,
-        layout: &Layout,
-        early: i64,
-        late: i64,
-    ) {
+    pub(crate) fn add_to(&self, equations: &mut NormalEquations, layout: &Layout, early: i64, late: i64) {
         let (first_column, first_row) = (layout.knot(early), layout.knot(late));
         for (row, sums) in self.0.iter().enumerate().map(|(k, sums)| (first_row + k, sums)) {
             // If the spans have common knots, the columns reach the diagonal; those after it belong to the mirrored

@@ -5,12 +5,12 @@ use super::flatness::{self, SurfelThickness};
 use super::moments::Moments;
 use super::principal::{eigenvalues, eigenvector};
 use super::{Surfel, TimedReturn};
-use crate::estimation::nominal::{Motion, Nominal};
-use crate::estimation::spec::SurfelSpec;
-use crate::estimation::unknowns::Unknowns;
-use crate::geometry::{Matrix, Vector};
-use crate::measurement::{LidarCorrection, LidarNoise};
+use crate::nominal::{Motion, Nominal};
+use crate::spec::SurfelSpec;
+use crate::unknowns::Unknowns;
 use rayon::prelude::*;
+use zsim_base::geometry::{Matrix, Vector};
+use zsim_base::measurement::{LidarCorrection, LidarNoise};
 
 /// Spacing of the poses that project returns, s; linear interpolation in between. At 400 degrees/s the error is 1.5 um per
 /// metre of range.
@@ -273,11 +273,11 @@ fn merge_by_cell(grid: &Grid, spec: &SurfelSpec, min_points: usize) -> Vec<Momen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::Formulation;
-    use crate::estimation::clock::Clock;
-    use crate::estimation::spec;
-    use crate::estimation::strapdown::{Biases, Interval, State};
-    use crate::geometry::Rotation;
+    use crate::Formulation;
+    use crate::clock::Clock;
+    use crate::spec;
+    use crate::strapdown::{Biases, Interval, State};
+    use zsim_base::geometry::Rotation;
 
     /// Planar scans by a lidar that turns at `nodding`, rad/s; `range_m` is the range along a direction in the map.
     fn scans(nodding: Vector, scans: usize, range_m: impl Fn(&Vector) -> f64) -> (Nominal, Vec<TimedReturn>) {

@@ -4,104 +4,104 @@ use super::super::nominal::Nominal;
 use super::super::spec::Formulation;
 use super::super::spline::Basis;
 use super::super::unknowns::Unknowns;
-use crate::geometry::Matrix;
-use crate::geometry::Vector;
-use crate::measurement::LidarCorrection;
+use zsim_base::geometry::Matrix;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::LidarCorrection;
 
 /// Resolution of half the finest voxel, of which surfels are built where the geometry is weak; the others are 0 to 5.
-pub(in crate::estimation) const FINE: usize = 6;
+pub(crate) const FINE: usize = 6;
 
 /// Edge of the voxels of resolution `level`, m, if those of resolution 0 have `finest_m`.
-pub(in crate::estimation) fn voxel_edge_m(finest_m: f64, level: usize) -> f64 {
+pub(crate) fn voxel_edge_m(finest_m: f64, level: usize) -> f64 {
     if level == FINE { 0.5 * finest_m } else { finest_m * f64::from(1_u32 << level) }
 }
 
 /// A lidar return in the IMU frame.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct TimedReturn {
+pub(crate) struct TimedReturn {
     /// Time of emission, lidar time, s.
-    pub(in crate::estimation) tau_s: f64,
+    pub(crate) tau_s: f64,
     /// Measured point in the IMU frame, m.
-    pub(in crate::estimation) point_in_imu: nalgebra::Vector3<f32>,
+    pub(crate) point_in_imu: nalgebra::Vector3<f32>,
     /// Measured range, m.
-    pub(in crate::estimation) range_m: f32,
+    pub(crate) range_m: f32,
     /// Inverse square of the intensity, in the unit of the sensor; 0 without intensity.
-    pub(in crate::estimation) weakness: f32,
+    pub(crate) weakness: f32,
 }
 
 /// A planar patch as measured by the calibrated lidar at the patch's mean time, in IMU axes.
 ///
 /// The estimated correction of the lidar's calibration is applied when the surfel is placed in the map.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::estimation) struct Surfel {
+pub(crate) struct Surfel {
     /// Mean time of the points, lidar time, s.
-    pub(in crate::estimation) tau_s: f64,
+    pub(crate) tau_s: f64,
     /// Vector from the lidar to the mean of the points, by the calibration, m.
-    pub(in crate::estimation) ray_in_imu: Vector,
+    pub(crate) ray_in_imu: Vector,
     /// Unit normal towards the lidar, by the calibration.
-    pub(in crate::estimation) normal_in_imu: Vector,
+    pub(crate) normal_in_imu: Vector,
     /// Second central moment of the points, by the calibration, m^2.
-    pub(in crate::estimation) covariance_in_imu: Matrix,
+    pub(crate) covariance_in_imu: Matrix,
     /// Additional variance of the position along the normal because the surface is not flat, m^2.
-    pub(in crate::estimation) roughness_variance: f64,
+    pub(crate) roughness_variance: f64,
     /// Number of points.
-    pub(in crate::estimation) points: f64,
+    pub(crate) points: f64,
     /// Mean weakness of the returns.
-    pub(in crate::estimation) weakness: f64,
+    pub(crate) weakness: f64,
     /// Resolution: 0 for the finest voxels, or [`FINE`].
-    pub(in crate::estimation) level: usize,
+    pub(crate) level: usize,
 }
 
 /// How the lidar saw a patch, and so how the patch moves with the lidar's calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::estimation) struct Sighting {
+pub(crate) struct Sighting {
     /// Unit vector from the lidar to the centre, in map axes.
-    pub(in crate::estimation) beam: Vector,
+    pub(crate) beam: Vector,
     /// Distance from the lidar to the centre, m.
-    pub(in crate::estimation) range_m: f64,
+    pub(crate) range_m: f64,
     /// Attitude of the IMU at that time.
-    pub(in crate::estimation) map_from_imu: Matrix,
+    pub(crate) map_from_imu: Matrix,
 }
 
 /// A planar patch of surface in the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::estimation) struct Patch {
+pub(crate) struct Patch {
     /// Centre, m.
-    pub(in crate::estimation) centre: Vector,
+    pub(crate) centre: Vector,
     /// Unit normal, towards the lidar.
-    pub(in crate::estimation) normal: Vector,
+    pub(crate) normal: Vector,
     /// Number of points.
-    pub(in crate::estimation) points: f64,
+    pub(crate) points: f64,
     /// Second central moment, m^2.
-    pub(in crate::estimation) covariance: Matrix,
+    pub(crate) covariance: Matrix,
     /// Additional variance of the position along the normal because the surface is not flat, m^2.
-    pub(in crate::estimation) roughness_variance: f64,
+    pub(crate) roughness_variance: f64,
     /// Resolution: 0 for the finest voxels, or [`FINE`].
-    pub(in crate::estimation) level: usize,
+    pub(crate) level: usize,
 }
 
 /// A surfel placed in the map by the trajectory, with derivatives by the window's unknowns.
 #[derive(Debug, Clone)]
-pub(in crate::estimation) struct PlacedSurfel {
+pub(crate) struct PlacedSurfel {
     /// The surfel in the map.
-    pub(in crate::estimation) patch: Patch,
+    pub(crate) patch: Patch,
     /// Mean time of the points, lidar time, s.
-    pub(in crate::estimation) tau_s: f64,
+    pub(crate) tau_s: f64,
     /// Vector from the IMU to the centre, in map axes, m.
-    pub(in crate::estimation) arm: Vector,
+    pub(crate) arm: Vector,
     /// How the lidar saw it.
-    pub(in crate::estimation) sighting: Sighting,
+    pub(crate) sighting: Sighting,
     /// Derivative of the centre by the clock offset, m/s; zero if the trajectory is in lidar time.
-    pub(in crate::estimation) velocity: Vector,
+    pub(crate) velocity: Vector,
     /// The correction spline's basis at that time.
-    pub(in crate::estimation) basis: Basis,
+    pub(crate) basis: Basis,
 }
 
 impl Patch {
     /// Variance of the normal's tilt towards `direction`, rad^2.
     ///
     /// A plane fitted to `N` points of variance `lambda` along the normal and `s^2` along the direction has `lambda / (N s^2)`.
-    pub(in crate::estimation) fn normal_tilt_variance(&self, direction: &Vector) -> f64 {
+    pub(crate) fn normal_tilt_variance(&self, direction: &Vector) -> f64 {
         let along = direction - self.normal * self.normal.dot(direction);
         let spread = along.dot(&(self.covariance * along)) / along.norm_squared();
         let thin = self.normal.dot(&(self.covariance * self.normal)).max(0.0);
@@ -117,19 +117,14 @@ impl Sighting {
 
     /// Derivatives of the position along `normal` by rotation and translation of the lidar, IMU axes.
     #[inline(always)]
-    pub(in crate::estimation) fn by_extrinsics(&self, normal: &Vector) -> [f64; 6] {
+    pub(crate) fn by_extrinsics(&self, normal: &Vector) -> [f64; 6] {
         let rotation = self.map_from_imu.tr_mul(&self.ray().cross(normal));
         let translation = self.map_from_imu.tr_mul(normal);
         [rotation.x, rotation.y, rotation.z, translation.x, translation.y, translation.z]
     }
 
     /// The patch that was placed with the correction `from`, placed with `to`; both are small.
-    pub(in crate::estimation) fn recalibrated(
-        &self,
-        patch: &Patch,
-        from: &LidarCorrection,
-        to: &LidarCorrection,
-    ) -> Patch {
+    pub(crate) fn recalibrated(&self, patch: &Patch, from: &LidarCorrection, to: &LidarCorrection) -> Patch {
         let longer = self.beam * (to.range_m - from.range_m);
         if (from.rotation, from.translation) == (to.rotation, to.translation) {
             return Patch { centre: patch.centre + longer, ..*patch };
@@ -143,17 +138,17 @@ impl Sighting {
 
 /// Trajectory and unknowns that place surfels in the map.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct PlacementState<'a> {
-    pub(in crate::estimation) nominal: &'a Nominal,
-    pub(in crate::estimation) unknowns: &'a Unknowns,
+pub(crate) struct PlacementState<'a> {
+    pub(crate) nominal: &'a Nominal,
+    pub(crate) unknowns: &'a Unknowns,
     /// Calibrated position of the lidar in the IMU frame, m.
-    pub(in crate::estimation) laser_in_imu: &'a Vector,
-    pub(in crate::estimation) knot_spacing_s: f64,
+    pub(crate) laser_in_imu: &'a Vector,
+    pub(crate) knot_spacing_s: f64,
 }
 
 impl Surfel {
     /// Places the surfel in the map.
-    pub(in crate::estimation) fn place(&self, by: &PlacementState<'_>) -> PlacedSurfel {
+    pub(crate) fn place(&self, by: &PlacementState<'_>) -> PlacedSurfel {
         let Unknowns { biases, clock, lidar, .. } = by.unknowns;
         let u_s = clock.trajectory_s(self.tau_s);
         let motion = by.nominal.at(u_s, &biases.gyro);

@@ -7,7 +7,7 @@
 //! there are no flat ones.
 
 use super::Surfel;
-use crate::estimation::spec::SurfelSpec;
+use crate::spec::SurfelSpec;
 
 /// Lower limit of the expected thickness variance, as a fraction of the range variance (0.2 standard deviations): at grazing
 /// incidence the projected noise vanishes, and no surfel would count as flat.
@@ -66,9 +66,9 @@ impl SurfelThickness {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::spec;
-    use crate::geometry::{Matrix, Vector};
+    use crate::spec;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Matrix, Vector};
 
     /// A surfel of 200 points with a thickness of `thickness_m`, at normal incidence, range noise 10 mm.
     fn surfel_with(thickness_m: f64, is_upright: bool) -> SurfelThickness {

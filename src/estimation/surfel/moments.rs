@@ -1,5 +1,5 @@
 use super::TimedReturn;
-use crate::geometry::{Matrix, Vector};
+use zsim_base::geometry::{Matrix, Vector};
 
 /// Additive sums over points: their number, mean time, mean and second central moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

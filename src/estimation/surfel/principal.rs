@@ -1,7 +1,7 @@
 //! Principal axes of the points of a surfel.
 
-use crate::geometry::{Matrix, Vector};
 use std::f64::consts::FRAC_PI_3;
+use zsim_base::geometry::{Matrix, Vector};
 
 /// The eigenvalues of a symmetric matrix, smallest first.
 ///
@@ -39,8 +39,8 @@ pub(super) fn eigenvector(m: &Matrix, eigenvalue: f64) -> Option<Vector> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::from_roll_pitch_yaw;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::from_roll_pitch_yaw;
 
     /// Covariances of thin patches, and of patches that are round or long, in several directions.
     #[test]

@@ -3,13 +3,13 @@
 use super::Window;
 use super::equations::{Displacement, WeightedMatches, Workspace};
 use super::linearised::Linearised;
-use crate::estimation::nominal::Correction;
-use crate::estimation::residual::inertial::{Nodes, add_inertial};
-use crate::estimation::residual::{Layout, paper, prior};
-use crate::estimation::spec::Formulation;
-use crate::estimation::spline::Basis;
-use crate::estimation::timing::{Stopwatch, Timing};
-use crate::estimation::unknowns::Unknowns;
+use crate::nominal::Correction;
+use crate::residual::inertial::{Nodes, add_inertial};
+use crate::residual::{Layout, paper, prior};
+use crate::spec::Formulation;
+use crate::spline::Basis;
+use crate::timing::{Stopwatch, Timing};
+use crate::unknowns::Unknowns;
 
 /// Standard deviation of the zero-velocity measurement at rest, m/s.
 const REST_VELOCITY_SIGMA: f64 = 0.003;

@@ -1,11 +1,11 @@
 //! Surfel matching: pairs within the window, and window surfels with patches of the fixed views.
 
-use crate::estimation::matching::Matcher;
-use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::{Patch, PlacedSurfel, Sighting};
-use crate::estimation::views::Views;
-use crate::geometry::Vector;
+use crate::matching::Matcher;
+use crate::residual::matched::Plane;
+use crate::surfel::{Patch, PlacedSurfel, Sighting};
+use crate::views::Views;
 use rayon::prelude::*;
+use zsim_base::geometry::Vector;
 
 /// The neighbour search is repeated when a surfel may have moved by this, m; smaller motion hardly changes the result.
 const SEARCH_MOTION_M: f64 = 0.02;

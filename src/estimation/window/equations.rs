@@ -1,16 +1,16 @@
 //! Parts of the window's normal equations: buffers, the robust kernel, and the matches with robust weights.
 
 use super::correspondence::{Counterpart, Match, Matches};
-use crate::estimation::normal_equations::{Factor, NormalEquations};
-use crate::estimation::residual::Layout;
-use crate::estimation::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
-use crate::estimation::residual::sums::{Coupling, SpanSums, SurfelSums};
-use crate::estimation::spec::SolveSpec;
-use crate::estimation::spline::Basis;
-use crate::estimation::surfel::PlacedSurfel;
-use crate::geometry::Vector;
+use crate::normal_equations::{Factor, NormalEquations};
+use crate::residual::Layout;
+use crate::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
+use crate::residual::sums::{Coupling, SpanSums, SurfelSums};
+use crate::spec::SolveSpec;
+use crate::spline::Basis;
+use crate::surfel::PlacedSurfel;
 use pulp::Arch;
 use rayon::prelude::*;
+use zsim_base::geometry::Vector;
 
 /// Buffers that all solves of a window share.
 #[derive(Debug)]
@@ -50,7 +50,7 @@ impl Robust {
 
 /// The largest displacement of the trajectory by a correction.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct Displacement {
+pub(crate) struct Displacement {
     /// Translation, m.
     pub translation_m: f64,
     /// Rotation, rad.

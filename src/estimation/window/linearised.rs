@@ -2,12 +2,12 @@
 
 use super::correspondence::Matches;
 use super::equations::Robust;
-use crate::estimation::residual::Layout;
-use crate::estimation::surfel::PlacedSurfel;
+use crate::residual::Layout;
+use crate::surfel::PlacedSurfel;
 
 /// The last linearisation of a solved window; the workspace still has the equations and the factor of it.
 #[derive(Debug)]
-pub(in crate::estimation) struct Linearised {
+pub(crate) struct Linearised {
     pub(super) layout: Layout,
     pub(super) scene: Vec<PlacedSurfel>,
     pub(super) matches: Matches,

@@ -8,34 +8,29 @@ use super::Window;
 use super::correspondence::{Counterpart, Match, Matches};
 use super::equations::WeightedMatches;
 use super::linearised::Linearised;
-use crate::estimation::nominal::Correction;
-use crate::estimation::normal_equations::Factor;
-use crate::estimation::residual::Layout;
-use crate::estimation::spline::Basis;
-use crate::geometry::{Pose, Rotation, skew};
+use crate::nominal::Correction;
+use crate::normal_equations::Factor;
+use crate::residual::Layout;
+use crate::spline::Basis;
 use nalgebra::Matrix6;
+use zsim_base::geometry::{Pose, Rotation, skew};
 
 /// The covariance of the motion is that over this time, s: errors of the velocity last longer than a step of the window.
 const COVARIANCE_S: f64 = 2.0;
 
 /// Motion of the IMU between two times by a window without views.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation) struct LocalMotion {
-    pub(in crate::estimation) imu_from_later_imu: Pose,
+pub(crate) struct LocalMotion {
+    pub(crate) imu_from_later_imu: Pose,
     /// Covariance of rotation (rad), then translation (m), in map axes, per second.
-    pub(in crate::estimation) covariance_per_s: Matrix6<f64>,
+    pub(crate) covariance_per_s: Matrix6<f64>,
 }
 
 impl Window {
     /// The motion from `from_s` to `until_s`, trajectory time, without the views.
     ///
     /// `None` if the equations without them are singular. Changes the equations of the workspace.
-    pub(in crate::estimation) fn motion_without_views(
-        &mut self,
-        from_s: f64,
-        until_s: f64,
-        at: &Linearised,
-    ) -> Option<LocalMotion> {
+    pub(crate) fn motion_without_views(&mut self, from_s: f64, until_s: f64, at: &Linearised) -> Option<LocalMotion> {
         let is_fixed = |one: &&Match| matches!(one.with, Counterpart::Fixed { .. });
         let fixed: Vec<_> = at.matches.all.iter().filter(is_fixed).copied().collect();
         let matches = Matches::of(fixed, &at.scene);

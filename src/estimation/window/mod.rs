@@ -32,13 +32,13 @@ use super::surfel::{Detail, FINE, Patch, PlacementState, Surfel, SurfelBuilder, 
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
 use super::views::{SeenPatch, SeenSegment};
-use crate::geometry::{Matrix, Pose, Rotation, Vector};
-use crate::measurement::LidarCorrection;
 use correspondence::CachedNeighbours;
 use equations::Workspace;
 use readings::Readings;
 use rests::Rests;
 use std::collections::VecDeque;
+use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
+use zsim_base::measurement::LidarCorrection;
 
 /// The head may move for this time before the IMU shows it, s.
 const REST_MARGIN_S: f64 = 0.3;

@@ -1,11 +1,11 @@
 //! The IMU readings of the window's intervals, as the clock offset and the corrections of the IMU change.
 
-use crate::estimation::clock::Clock;
-use crate::estimation::imu_signal::ImuSignal;
-use crate::estimation::nominal::Nominal;
-use crate::estimation::spec::Formulation;
-use crate::estimation::strapdown::Interval;
-use crate::estimation::unknowns::{Unknowns, scale_misalignment_step};
+use crate::clock::Clock;
+use crate::imu_signal::ImuSignal;
+use crate::nominal::Nominal;
+use crate::spec::Formulation;
+use crate::strapdown::Interval;
+use crate::unknowns::{Unknowns, scale_misalignment_step};
 
 /// A node of the trajectory is left out if it would be closer to the last one than this fraction of the interval.
 const MIN_INTERVAL_RATIO: f64 = 0.25;

@@ -1,7 +1,7 @@
 //! Rests after the start: zero-velocity and zero-rate measurements.
 
-use crate::estimation::initial::RestReadings;
-use crate::estimation::strapdown::{Biases, Interval};
+use crate::initial::RestReadings;
+use crate::strapdown::{Biases, Interval};
 
 /// Minimum duration of a rest, s.
 const MIN_DURATION_S: f64 = 0.7;
@@ -70,7 +70,7 @@ pub(super) fn turns(interval: &Interval, biases: &Biases) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
+    use zsim_base::geometry::Vector;
 
     fn interval(rate: f64) -> Interval {
         Interval {

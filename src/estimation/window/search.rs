@@ -2,11 +2,11 @@
 
 use super::correspondence::{CachedNeighbours, Counterpart, Match, Matches, Neighbours};
 use super::{Window, WindowSegment};
-use crate::estimation::residual::matched::Plane;
-use crate::estimation::surfel::{Patch, PlacedSurfel, Surfel};
-use crate::estimation::views::Views;
-use crate::geometry::Vector;
+use crate::residual::matched::Plane;
+use crate::surfel::{Patch, PlacedSurfel, Surfel};
+use crate::views::Views;
 use rayon::prelude::*;
+use zsim_base::geometry::Vector;
 
 /// Widening of the match gate in a first window that starts in motion, and after a bridged gap.
 const WIDE_GATE: f64 = 3.0;

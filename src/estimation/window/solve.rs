@@ -4,13 +4,13 @@ use super::Window;
 use super::correspondence::{Counterpart, Match, Matches, Neighbours};
 use super::equations::Robust;
 use super::linearised::Linearised;
-use crate::estimation::nominal::Correction;
-use crate::estimation::residual::Layout;
-use crate::estimation::residual::matched::MIN_SIGNIFICANT_TILT;
-use crate::estimation::surfel::{FINE, PlacedSurfel};
-use crate::estimation::timing::{Stopwatch, Timing};
-use crate::estimation::views::Views;
-use crate::geometry::{Matrix, Vector};
+use crate::nominal::Correction;
+use crate::residual::Layout;
+use crate::residual::matched::MIN_SIGNIFICANT_TILT;
+use crate::surfel::{FINE, PlacedSurfel};
+use crate::timing::{Stopwatch, Timing};
+use crate::views::Views;
+use zsim_base::geometry::{Matrix, Vector};
 
 /// A correction above this (m, rad) in one iteration is rejected.
 const MAX_CORRECTION: (f64, f64) = (2.0, 0.8);
@@ -27,7 +27,7 @@ const UNCONSTRAINED: f64 = 0.01;
 
 /// Statistics of a window's solution.
 #[derive(Debug, Clone, Default)]
-pub(in crate::estimation) struct WindowSolution {
+pub(crate) struct WindowSolution {
     pub surfels: usize,
     pub matches: usize,
     pub view_matches: usize,
@@ -45,7 +45,7 @@ pub(in crate::estimation) struct WindowSolution {
 
 impl Window {
     /// Solves the window; returns the last linearisation if the solution is accepted.
-    pub(in crate::estimation) fn solve(&mut self, views: &Views) -> (WindowSolution, Option<Linearised>) {
+    pub(crate) fn solve(&mut self, views: &Views) -> (WindowSolution, Option<Linearised>) {
         if self.nominal.end_s() <= self.start.u_s {
             let failure = Some("the IMU samples do not reach the window");
             return (WindowSolution { failure, ..WindowSolution::default() }, None);

@@ -3,23 +3,23 @@
 use super::Window;
 use super::correspondence::{Counterpart, Match};
 use super::linearised::Linearised;
-use crate::estimation::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
-use crate::estimation::residual::matched::{self, SurfelJacobian};
-use crate::estimation::residual::prior::ByLidar;
-use crate::estimation::residual::{LIDAR_ROTATION, Layout};
-use crate::estimation::spline::Basis;
-use crate::estimation::views::Views;
-use crate::geometry::Vector;
+use crate::consider::{IMU_OFFSET, IMU_STATES, START_STATES, Sensitivity, StartMatrix};
+use crate::residual::matched::{self, SurfelJacobian};
+use crate::residual::prior::ByLidar;
+use crate::residual::{LIDAR_ROTATION, Layout};
+use crate::spline::Basis;
+use crate::views::Views;
 use nalgebra::{Matrix6, SMatrix};
 use pulp::Arch;
 use rayon::prelude::*;
+use zsim_base::geometry::Vector;
 
 /// Number of a view, and a column of the right-hand side for each component of its error.
 type ViewColumns = (u64, [Vec<f64>; 6]);
 
 impl Window {
     /// Sensitivities of the states at `times_s`, trajectory time, to the quantities that this window assumes fixed.
-    pub(in crate::estimation) fn sensitivities_at<const T: usize>(
+    pub(crate) fn sensitivities_at<const T: usize>(
         &self,
         times_s: [f64; T],
         at: &Linearised,
@@ -58,7 +58,7 @@ impl Window {
     }
 
     /// Covariance of the start states, as the window's equations assume it.
-    pub(in crate::estimation) fn known_at_start(&self) -> Option<StartMatrix> {
+    pub(crate) fn known_at_start(&self) -> Option<StartMatrix> {
         let sigma = |k: usize| self.start.sigmas[k / 6][k % 6 / 3];
         let mut known = StartMatrix::zeros();
         (0..12).for_each(|k| known[(k, k)] = sigma(k).powi(2));

@@ -1,9 +1,9 @@
 //! The measurements of one epoch.
 
-use crate::geometry::{Pose, Rotation, Vector};
-use crate::measurement::ImuSample;
-use crate::time::Stamp;
 use nalgebra::{SMatrix, SVector};
+use zsim_base::geometry::{Pose, Rotation, Vector};
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::Stamp;
 
 /// A beam that hit a static surface, without noise.
 #[derive(Debug, Clone, Copy, PartialEq)]

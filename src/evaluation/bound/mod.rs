@@ -36,12 +36,12 @@ pub use epoch::BeamObservation;
 pub use model::{BoundModel, InformationBound, MapKnowledge, UnknownMap};
 
 use super::EvaluationError;
-use crate::geometry::Pose;
-use crate::measurement::ImuSample;
-use crate::time::{Span, Stamp};
 use epoch::Epoch;
 use model::EPOCH;
 use unknown_map::{MapPrior, Sightings};
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::{Span, Stamp};
 
 /// Fisher information of a recording, accumulated while it is read.
 ///

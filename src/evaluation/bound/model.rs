@@ -1,8 +1,8 @@
 //! The sensor model of the bound, and the bound itself.
 
-use crate::geometry::{Pose, Vector};
-use crate::measurement::ImuNoise;
-use crate::time::{Span, Stamp};
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::measurement::ImuNoise;
+use zsim_base::time::{Span, Stamp};
 
 /// Time between the epochs at which errors are reported.
 pub(super) const EPOCH: Span = Span::from_nanos(20_000_000);

@@ -6,8 +6,8 @@ use super::state::{
     ACCEL_BIAS, ACCEL_MATRIX, ATTITUDE, CHANGING, CLOCK, CLOCK_RATE, CONSTANT, GYRO_BIAS, GYRO_MATRIX, N, POSITION,
     SUMS, State, VELOCITY,
 };
-use crate::geometry::{Matrix, Vector, skew};
 use nalgebra::SMatrix;
+use zsim_base::geometry::{Matrix, Vector, skew};
 
 /// Jacobian of a reported error (attitude or position of the head, in lidar time) with respect to the state.
 pub(super) type OutputJacobian = SMatrix<f64, 3, N>;

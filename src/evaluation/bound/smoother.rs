@@ -15,9 +15,9 @@ use super::epoch::{BeamInformation, Epoch};
 use super::model::{BoundModel, EPOCH, InformationBound};
 use super::motion::{OutputJacobian, Step, attitude_jacobian, head_in_world, position_jacobian};
 use super::state::{ATTITUDE, CLOCK, CLOCK_RATE, N, POSITION, RANGE, SUMS, State, prior};
-use crate::geometry::{Matrix, Vector, skew};
-use crate::time::{Span, Stamp};
 use nalgebra::{Matrix6, SMatrix};
+use zsim_base::geometry::{Matrix, Vector, skew};
+use zsim_base::time::{Span, Stamp};
 
 /// Number of epochs between stored covariances: a compromise between memory and recomputation.
 const CHECKPOINT_INTERVAL: usize = 64;
@@ -231,9 +231,9 @@ fn alignment_reduction(run: &Run<'_>, last: &State) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2};
-    use crate::measurement::ImuSample;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Pose, Rotation, STANDARD_GRAVITY_M_PER_S2};
+    use zsim_base::measurement::ImuSample;
 
     /// Two epochs in motion, with an IMU sample each.
     fn epochs() -> [Epoch; 2] {

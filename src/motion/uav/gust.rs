@@ -1,11 +1,11 @@
 //! Wind gusts, and the response of a hovering craft.
 
 use super::{GustSpec, UavSpec};
-use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::motion::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
-use crate::random::Stream;
+use crate::sines::{FrequencyBin, SineSum, SpectralLine, log_bins};
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
+use zsim_base::geometry::STANDARD_GRAVITY_M_PER_S2;
+use zsim_base::random::Stream;
 
 /// Direction of a gust component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,9 +95,9 @@ pub(super) fn vertical(spec: &UavSpec, stream: &mut Stream) -> SineSum<1> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
-    use crate::signal::{Segments, power_density};
     use approx::assert_relative_eq;
+    use zsim_base::random::Seed;
+    use zsim_base::signal::{Segments, power_density};
 
     const WIND: GustSpec = GustSpec { wind_m_per_s: 7.7, airspeed_m_per_s: 8.0 };
 

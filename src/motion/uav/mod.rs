@@ -15,11 +15,11 @@ use super::sines::SineSum;
 use super::smooth::SmoothSteps;
 use super::walk::RouteMotion;
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Route, STANDARD_GRAVITY_M_PER_S2};
-use crate::random::Seed;
-use crate::spec::Source;
 use gust::{horizontal, vertical};
 use rotors::Rotors;
+use zsim_base::geometry::{Kinematics, Route, STANDARD_GRAVITY_M_PER_S2};
+use zsim_base::random::Seed;
+use zsim_base::spec::Source;
 
 /// Motion of a multirotor.
 pub(super) struct Uav {

@@ -1,13 +1,13 @@
 //! Rotor vibration: each rotor has a different speed, an imbalance, and a blade-pass oscillation.
 
-use crate::motion::jet::Jet;
-use crate::motion::sines::{SineSum, SpectralLine};
-use crate::random::Stream;
-use crate::spec::checked::{NonNegative, Positive};
+use crate::jet::Jet;
+use crate::sines::{SineSum, SpectralLine};
 use nalgebra::Complex;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use zsim_base::random::Stream;
+use zsim_base::spec::checked::{NonNegative, Positive};
 
 /// Rotors of a multirotor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -19,7 +19,7 @@ pub struct RotorSpec {
     #[serde(with = "Positive")]
     pub speed_hz: f64,
     /// Maximum deviation of a rotor's speed from the mean, as a fraction of it; uniformly distributed.
-    #[serde(with = "crate::spec::checked::Fraction")]
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub speed_spread: f64,
     /// Blades per rotor.
     pub blades: u8,
@@ -62,8 +62,8 @@ impl Rotors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
     use approx::assert_relative_eq;
+    use zsim_base::random::Seed;
 
     #[test]
     fn one_rotor_shakes_in_a_circle_and_its_blades_beat_upwards() {

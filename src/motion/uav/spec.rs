@@ -2,10 +2,10 @@
 
 use super::super::walk::WalkSpec;
 use super::rotors::RotorSpec;
-use crate::spec::checked::NonNegative;
-use crate::spec::checked::Positive;
 use serde::Deserialize;
 use serde::Serialize;
+use zsim_base::spec::checked::NonNegative;
+use zsim_base::spec::checked::Positive;
 
 /// A small multirotor that carries the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,14 +1,14 @@
 //! Engine vibration: harmonics of the engine speed.
 
-use crate::motion::jet::Jet;
-use crate::motion::oscillator::BandLimitedNoise;
-use crate::motion::sines::{SineSum, SpectralLine};
-use crate::random::Stream;
-use crate::spec::checked::{FiniteArray, NonNegative, Positive};
+use crate::jet::Jet;
+use crate::oscillator::BandLimitedNoise;
+use crate::sines::{SineSum, SpectralLine};
 use nalgebra::Complex;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use zsim_base::random::Stream;
+use zsim_base::spec::checked::{FiniteArray, NonNegative, Positive};
 
 /// An engine at nearly constant speed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -68,9 +68,9 @@ impl Engine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
-    use crate::signal::{Segments, power_density};
     use approx::assert_relative_eq;
+    use zsim_base::random::Seed;
+    use zsim_base::signal::{Segments, power_density};
 
     #[test]
     fn harmonics_have_their_amplitude_at_multiples_of_the_engine_speed() {

@@ -19,12 +19,12 @@ use super::sines::SineSum;
 use super::smooth::{SmoothPath, SmoothSteps};
 use super::walk::{RouteMotion, WalkSpec};
 use super::{BaseMotion, MotionError};
-use crate::geometry::{Kinematics, Pose, Route};
-use crate::random::Seed;
-use crate::spec::checked::{FiniteArray, NonNegative};
-use crate::spec::{Source, SpecError};
 use engine::Engine;
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::{Kinematics, Pose, Route};
+use zsim_base::random::Seed;
+use zsim_base::spec::checked::{FiniteArray, NonNegative};
+use zsim_base::spec::{Source, SpecError};
 
 /// A wheeled vehicle that carries the base. It turns on the spot at sharp corners, as a skid-steered vehicle does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

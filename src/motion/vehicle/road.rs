@@ -6,8 +6,8 @@
 //! coherence of tracks at a distance b is `x K_1(x)` with `x = 2 pi n b` (Kamash and Robson 1978; Basset's integral of
 //! the two-dimensional spectrum).
 
-use crate::motion::sines::{FrequencyBin, SpectralLine, log_bins};
-use crate::random::Stream;
+use crate::sines::{FrequencyBin, SpectralLine, log_bins};
+use zsim_base::random::Stream;
 
 use nalgebra::Complex;
 use rand::RngExt;
@@ -23,7 +23,7 @@ pub enum RoadSpec {
     /// Another road or floor, by roughness.
     Roughness {
         /// Displacement density at 0.1 cycles/m, 1e-6 m^3. A larger value is rougher.
-        #[serde(with = "crate::spec::checked::NonNegative")]
+        #[serde(with = "zsim_base::spec::checked::NonNegative")]
         at_n0_1e6_m3: f64,
     },
 }
@@ -97,10 +97,10 @@ fn coherence(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::sines::SineSum;
-    use crate::random::Seed;
-    use crate::signal::{Segments, power_density, transfer_function};
+    use crate::sines::SineSum;
     use approx::assert_relative_eq;
+    use zsim_base::random::Seed;
+    use zsim_base::signal::{Segments, power_density, transfer_function};
 
     /// Heights of both tracks every 5 cm over 5 km, and the segments of the spectral estimate.
     fn heights(class: RoadClass) -> ([Vec<f64>; 2], Segments) {

@@ -3,12 +3,12 @@
 //! The linear full-car model (Wong, Theory of Ground Vehicles, chapter 7): three coordinates of the body q = (heave,
 //! roll, pitch), one per wheel; spring and damper between wheel and body; the tyre is a spring.
 
-use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::motion::sines::SpectralLine;
-use crate::spec::checked::{NonNegative, Positive};
+use crate::sines::SpectralLine;
 use nalgebra::{Complex, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use zsim_base::geometry::STANDARD_GRAVITY_M_PER_S2;
+use zsim_base::spec::checked::{NonNegative, Positive};
 
 /// A body on four sprung wheels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

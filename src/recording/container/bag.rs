@@ -3,7 +3,7 @@
 use super::file_index::{BagChunk, Block, BlockKind, Ending, FileIndex};
 use super::record::{ChannelRecord, Fields, SchemaRecord, begins_with_header};
 use super::source::Source;
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

@@ -3,7 +3,7 @@
 use super::entry::{Damage, Entry};
 use super::file_index::{Block, BlockKind, Ending, FileIndex};
 use super::record::{ChannelRecord, SchemaRecord};
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, Row};
 use std::path::Path;
@@ -163,7 +163,7 @@ fn read_topics(database: &Connection, index: &mut FileIndex) -> rusqlite::Result
     while let Some(row) = rows.next()? {
         let Ok(id) = u16::try_from(row.get::<_, i64>(0)?) else { continue };
         let name: String = row.get(2)?;
-        let has_header = crate::recording::schema::MessageType::has_header(&name);
+        let has_header = crate::schema::MessageType::has_header(&name);
         index.schemas.insert(id, SchemaRecord { id, name, has_header });
         index.channels.insert(id, ChannelRecord { id, schema: id, topic: row.get(1)?, encoding: row.get(3)? });
     }

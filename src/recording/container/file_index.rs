@@ -1,8 +1,8 @@
 //! Index of a file: topics, definitions and blocks, without the messages.
 
 use super::record::{self, ChannelRecord, ChunkHeader, SchemaRecord, op};
-use crate::recording::topics::printable;
-use crate::recording::wire::WireFormat;
+use crate::topics::printable;
+use crate::wire::WireFormat;
 use std::collections::BTreeMap;
 
 /// Number of a topic within a recording: number of the file and number within the file.

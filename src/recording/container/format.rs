@@ -6,7 +6,7 @@ use super::loaded_block::LoadedBlock;
 use super::recording_file::{RecordingFile, Store};
 use super::source::{Input, Source};
 use super::{bag, mcap_indexer, record};
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use std::path::Path;
 
 /// Number of first bytes that identify a format.

@@ -7,7 +7,7 @@ use super::file_index::{Block, BlockKind, FileIndex};
 use super::mcap_summary::next_record;
 use super::record::{self, Fields, op};
 use super::recording_file::Store;
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use std::io::Read;
 use std::ops::Range;
 

@@ -4,7 +4,7 @@ use super::file_index::{Block, BlockKind, Ending, FileIndex};
 use super::mcap_summary::{self, McapSummary};
 use super::record::{self, MAGIC, MESSAGE_FIELDS, PREFIX, op};
 use super::source::{Input, Source};
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
 /// Maximum length of a record that is read completely here (definitions, topics, metadata), bytes.

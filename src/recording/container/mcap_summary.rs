@@ -4,7 +4,7 @@
 
 use super::record::{Fields, MAGIC, PREFIX, op};
 use super::source::Source;
-use crate::recording::RecordingError;
+use crate::RecordingError;
 
 /// Bytes of a footer's fields: offset of the summary, offset of the summary offsets, and CRC.
 const FOOTER_BYTES: u64 = 20;

@@ -5,8 +5,8 @@ use super::file_index::Block;
 use super::file_index::ChannelId;
 use super::loaded_block::LoadedBlock;
 use super::recording_file::RecordingFile;
-use crate::recording::RecordingError;
-use crate::recording::wire::Payload;
+use crate::RecordingError;
+use crate::wire::Payload;
 use std::collections::VecDeque;
 
 /// Maximum size of the blocks in memory, bytes.

@@ -3,7 +3,7 @@
 use super::database::SqliteDatabase;
 use super::file_index::{Channel, ChannelId, FileIndex};
 use super::source::Source;
-use crate::recording::wire::WireFormat;
+use crate::wire::WireFormat;
 use std::collections::BTreeMap;
 
 /// Bits of a [`ChannelId`] for the number within the file.

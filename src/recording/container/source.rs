@@ -1,6 +1,6 @@
 //! Random access to the bytes of a file.
 
-use crate::recording::RecordingError;
+use crate::RecordingError;
 use std::io::{Read, Seek, SeekFrom};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

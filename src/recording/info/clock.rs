@@ -1,7 +1,7 @@
 //! Incremental line fit of one clock to another.
 
-use crate::time::Stamp;
 use serde::Serialize;
+use zsim_base::time::Stamp;
 
 /// Minimum number of messages for a fit: two parameters and one residual.
 const MIN_MESSAGES: u64 = 3;

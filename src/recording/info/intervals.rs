@@ -1,7 +1,7 @@
 //! Incremental statistics of the intervals between messages.
 
-use crate::signal::{Regularity, StampPattern};
-use crate::time::{Span, Stamp};
+use zsim_base::signal::{Regularity, StampPattern};
+use zsim_base::time::{Span, Stamp};
 
 /// Number of intervals from which the period is determined.
 const LEARNING_INTERVALS: usize = 1000;

@@ -1,8 +1,8 @@
 //! `sensor_msgs/TimeReference`: time on a sensor's clock at a true time.
 
-use crate::recording::RecordingError;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
-use crate::time::Stamp;
+use crate::RecordingError;
+use crate::wire::{DecodeError, Decoder, Encoder, Payload};
+use zsim_base::time::Stamp;
 
 /// Reading of a sensor's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! `diagnostic_msgs/DiagnosticArray`: the status of a program.
 
-use crate::recording::RecordingError;
-use crate::recording::wire::Encoder;
-use crate::time::Stamp;
+use crate::RecordingError;
+use crate::wire::Encoder;
+use zsim_base::time::Stamp;
 
 /// Level of a status, as in `diagnostic_msgs/DiagnosticStatus`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,9 +2,9 @@
 //!
 //! REP-145: gravity is included; `orientation_covariance[0] = -1` if orientation is not measured.
 
-use crate::measurement::{ImuNoise, ImuSample};
-use crate::recording::RecordingError;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
+use crate::RecordingError;
+use crate::wire::{DecodeError, Decoder, Encoder, Payload};
+use zsim_base::measurement::{ImuNoise, ImuSample};
 
 /// Noise variances in an IMU's messages.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +88,7 @@ pub fn decode(message: Payload<'_>, unit: ForceUnit) -> Result<ImuSample, Decode
 }
 
 /// Whether all numbers of a sample are finite.
-pub(in crate::recording) fn is_finite(sample: &ImuSample) -> bool {
+pub(crate) fn is_finite(sample: &ImuSample) -> bool {
     let numbers = sample.angular_velocity_rad_per_s.iter().chain(sample.specific_force_m_per_s2.iter());
     numbers.into_iter().all(|x| x.is_finite())
 }
@@ -96,8 +96,8 @@ pub(in crate::recording) fn is_finite(sample: &ImuSample) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::time::Stamp;
+    use zsim_base::geometry::Vector;
+    use zsim_base::time::Stamp;
 
     #[test]
     fn orientation_is_marked_unmeasured_and_variances_are_per_sample() {

@@ -1,10 +1,10 @@
 //! `livox_ros_driver/CustomMsg` and `livox_ros_driver2/CustomMsg`: points in firing order.
 
-use crate::measurement::{LidarReturn, LidarScan};
-use crate::recording::message::no_returns::RangeLimits;
-use crate::recording::message::scan::sort_by_firing_time;
-use crate::recording::wire::{DecodeError, Decoder, Payload};
-use crate::time::Span;
+use crate::message::no_returns::RangeLimits;
+use crate::message::scan::sort_by_firing_time;
+use crate::wire::{DecodeError, Decoder, Payload};
+use zsim_base::measurement::{LidarReturn, LidarScan};
+use zsim_base::time::Span;
 
 /// Bytes of a point: a time, three coordinates, reflectivity, tag and line.
 const POINT_BYTES: usize = 4 + 12 + 3;

@@ -1,9 +1,9 @@
 //! `sensor_msgs/MultiEchoLaserScan`: a planar sweep with several echoes per beam.
 
-use crate::measurement::PlanarScan;
-use crate::recording::message::scan::{ScanHeader, build_planar};
-use crate::recording::wire::{DecodeError, Decoder, Payload};
-use crate::time::Stamp;
+use crate::message::scan::{ScanHeader, build_planar};
+use crate::wire::{DecodeError, Decoder, Payload};
+use zsim_base::measurement::PlanarScan;
+use zsim_base::time::Stamp;
 
 /// Decodes a sweep with one echo per beam: the strongest if each has an intensity, else the first.
 ///

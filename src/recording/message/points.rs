@@ -3,15 +3,15 @@
 mod fields;
 mod time_unit;
 
-use crate::measurement::{LidarReturn, LidarScan};
-use crate::recording::RecordingError;
-use crate::recording::message::no_returns::{NoReturnDetector, RangeLimits};
-use crate::recording::message::scan::sort_by_firing_time;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
-use crate::time::{Span, Stamp};
+use crate::RecordingError;
+use crate::message::no_returns::{NoReturnDetector, RangeLimits};
+use crate::message::scan::sort_by_firing_time;
+use crate::wire::{DecodeError, Decoder, Encoder, Payload};
 pub use fields::TimeField;
 use fields::{FLOAT32, Field, UINT32};
 pub use time_unit::{CloudDuration, TimeUnit};
+use zsim_base::measurement::{LidarReturn, LidarScan};
+use zsim_base::time::{Span, Stamp};
 
 /// Bytes of a point written by [`encode`]: x, y, z, intensity, t.
 const POINT_STEP: usize = 20;

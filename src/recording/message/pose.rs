@@ -1,9 +1,9 @@
 //! `geometry_msgs/PoseStamped`, `geometry_msgs/PoseWithCovarianceStamped`, `nav_msgs/Odometry` and `nav_msgs/Path`.
 
-use crate::geometry::{Kinematics, Pose, PoseCovariance};
-use crate::recording::RecordingError;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
-use crate::time::Stamp;
+use crate::RecordingError;
+use crate::wire::{DecodeError, Decoder, Encoder, Payload};
+use zsim_base::geometry::{Kinematics, Pose, PoseCovariance};
+use zsim_base::time::Stamp;
 
 /// Encodes a `PoseStamped` in `frame`.
 ///
@@ -98,8 +98,8 @@ pub fn encode_path<'p>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Vector, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Vector, from_roll_pitch_yaw};
 
     #[test]
     fn the_twist_of_odometry_is_in_the_moving_frame() {

@@ -1,10 +1,10 @@
 //! `sensor_msgs/LaserScan`: one planar sweep (REP-103, REP-117).
 
-use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
-use crate::recording::RecordingError;
-use crate::recording::message::no_returns::RangeLimits;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
-use crate::time::{Span, Stamp};
+use crate::RecordingError;
+use crate::message::no_returns::RangeLimits;
+use crate::wire::{DecodeError, Decoder, Encoder, Payload};
+use zsim_base::measurement::{LidarReturn, LidarScan, PlanarScan};
+use zsim_base::time::{Span, Stamp};
 
 /// Maximum credible duration of a sweep, s.
 const MAX_SWEEP_S: f64 = 60.0;

@@ -1,10 +1,10 @@
 //! `tf2_msgs/TFMessage`: transforms between frames.
 
-use crate::geometry::Pose;
-use crate::recording::RecordingError;
-use crate::recording::topics::printable;
-use crate::recording::wire::{DecodeError, Decoder, Encoder, Payload};
-use crate::time::Stamp;
+use crate::RecordingError;
+use crate::topics::printable;
+use crate::wire::{DecodeError, Decoder, Encoder, Payload};
+use zsim_base::geometry::Pose;
+use zsim_base::time::Stamp;
 
 /// Minimum bytes of a serialised transform: time, two strings, seven doubles.
 const MIN_BYTES: usize = 8 + 5 + 5 + 56;

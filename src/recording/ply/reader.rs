@@ -1,9 +1,9 @@
 use super::header::{self, PlyFormat, Property};
-use crate::recording::{CloudPoint, RecordingError};
-use crate::time::{Span, Stamp};
+use crate::{CloudPoint, RecordingError};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use zsim_base::time::{Span, Stamp};
 
 /// Reads the points of a cloud sequentially.
 pub struct PlyReader<R: Read> {

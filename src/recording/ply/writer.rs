@@ -1,8 +1,8 @@
-use crate::recording::{CloudPoint, RecordingError};
-use crate::time::Stamp;
+use crate::{CloudPoint, RecordingError};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
+use zsim_base::time::Stamp;
 
 /// Size of a written point, bytes.
 const POINT_BYTES: usize = 4 * 4 + 8 + 4;

@@ -1,12 +1,12 @@
 //! Topics that may be the lidar or the IMU, judged by their first messages.
 
-use crate::recording::container::{ChannelId, Messages, RawMessage};
-use crate::recording::message::transforms::printable_frame;
-use crate::recording::message::{imu, livox, multi_echo, points, scan};
-use crate::recording::schema::MessageType;
-use crate::recording::topics::TRUTH_PREFIX;
-use crate::recording::wire::{DecodeError, Decoder};
-use crate::recording::{Reader, RecordingError};
+use crate::container::{ChannelId, Messages, RawMessage};
+use crate::message::transforms::printable_frame;
+use crate::message::{imu, livox, multi_echo, points, scan};
+use crate::schema::MessageType;
+use crate::topics::TRUTH_PREFIX;
+use crate::wire::{DecodeError, Decoder};
+use crate::{Reader, RecordingError};
 use std::collections::BTreeMap;
 
 /// Message encoding of a lidar.
@@ -183,7 +183,7 @@ pub fn probe_lidar(message: &RawMessage<'_>, kind: MessageType, topic: &str) -> 
     Ok(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times, is_empty })
 }
 
-fn planar_properties(kind: LidarKind, scan: &crate::measurement::PlanarScan) -> (LidarKind, BeamTimes, bool) {
+fn planar_properties(kind: LidarKind, scan: &zsim_base::measurement::PlanarScan) -> (LidarKind, BeamTimes, bool) {
     let times = match (scan.time_increment_s == 0.0, scan::time_increment_s(scan) == 0.0) {
         (false, _) => BeamTimes::Stated,
         (true, false) => BeamTimes::Implied,

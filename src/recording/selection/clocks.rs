@@ -1,7 +1,7 @@
 //! Detects different epochs of the lidar's and IMU's clocks from log times.
 
 use super::content::quantile;
-use crate::time::{Span, Stamp};
+use zsim_base::time::{Span, Stamp};
 
 /// Smallest offset that is corrected here, s; the estimator determines smaller ones more accurately.
 const MIN_OFFSET_S: f64 = 0.05;

@@ -2,8 +2,8 @@
 //!
 //! The content is acceleration, angular velocity or both, the unit of acceleration, and whether gravity is included.
 
-use crate::measurement::{ImuSample, ONE_G_RANGE};
-use crate::recording::message::imu::ForceUnit;
+use crate::message::imu::ForceUnit;
+use zsim_base::measurement::{ImuSample, ONE_G_RANGE};
 
 /// Minimum number of samples for a decision.
 const MIN_SAMPLES: usize = 20;
@@ -98,7 +98,7 @@ fn second_averages(samples: &[ImuSample]) -> Vec<f64> {
         let count =
             rest.iter().take_while(|s| (0.0..AVERAGING_S).contains(&s.stamp.seconds_since(first.stamp))).count();
         let (window, later) = rest.split_at(count.max(1));
-        let sum: crate::geometry::Vector = window.iter().map(|sample| sample.specific_force_m_per_s2).sum();
+        let sum: zsim_base::geometry::Vector = window.iter().map(|sample| sample.specific_force_m_per_s2).sum();
         second_averages.push((sum / window.len() as f64).norm());
         rest = later;
     }
@@ -108,8 +108,8 @@ fn second_averages(samples: &[ImuSample]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::time::Stamp;
+    use zsim_base::geometry::Vector;
+    use zsim_base::time::Stamp;
 
     /// 12 s at 100 Hz; the arguments are functions of the time in s.
     fn samples(force: impl Fn(f64) -> Vector, rate: impl Fn(f64) -> Vector) -> Vec<ImuSample> {

@@ -3,11 +3,11 @@
 use super::candidates::Candidate;
 use super::content::{Content, detect_unit, quantile};
 use super::preview::ImuPreview;
-use crate::measurement::ImuSample;
-use crate::recording::message::imu::ForceUnit;
-use crate::recording::{Reader, RecordingError};
-use crate::time::Span;
+use crate::message::imu::ForceUnit;
+use crate::{Reader, RecordingError};
 use std::collections::BTreeMap;
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::Span;
 
 /// Endings of IMU topic names, preferred first: raw data are not altered by a filter.
 const NAME_ENDINGS: [&str; 3] = ["imu/data_raw", "imu/data", "imu"];

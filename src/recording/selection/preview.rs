@@ -2,13 +2,13 @@
 
 use super::clocks::LogTimes;
 use super::content::quantile;
-use crate::measurement::ImuSample;
-use crate::recording::container::{ChannelId, RawMessage};
-use crate::recording::message::imu::{self, ForceUnit};
-use crate::recording::wire::Decoder;
-use crate::recording::{Reader, RecordingError};
-use crate::time::Stamp;
+use crate::container::{ChannelId, RawMessage};
+use crate::message::imu::{self, ForceUnit};
+use crate::wire::Decoder;
+use crate::{Reader, RecordingError};
 use std::collections::BTreeMap;
+use zsim_base::measurement::ImuSample;
+use zsim_base::time::Stamp;
 
 /// Length of the preview, s of log time: above the 10 s that prove the absence of gravity.
 const PREVIEW_S: f64 = 12.0;

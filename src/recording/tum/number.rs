@@ -1,7 +1,7 @@
 //! Decimal numbers: exact for stamps, and fast.
 
-use crate::time::{NANOS_PER_SECOND, Stamp};
 use std::io::Write;
+use zsim_base::time::{NANOS_PER_SECOND, Stamp};
 
 /// Decimals of each number.
 const DECIMALS: usize = 9;

@@ -1,5 +1,5 @@
-use crate::geometry::{Pose, Rotation, Vector};
-use crate::time::{NANOS_PER_SECOND, Stamp};
+use zsim_base::geometry::{Pose, Rotation, Vector};
+use zsim_base::time::{NANOS_PER_SECOND, Stamp};
 
 /// Serialisation of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
-use crate::geometry::{Pose, Vector};
-use crate::recording::RecordingError;
-use crate::time::{NANOS_PER_SECOND, Stamp};
+use crate::RecordingError;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::time::{NANOS_PER_SECOND, Stamp};
 
 /// Encapsulation header of plain little-endian CDR, version 1.
 const LITTLE_ENDIAN_CDR: [u8; 4] = [0, 1, 0, 0];

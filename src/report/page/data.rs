@@ -1,8 +1,8 @@
 //! The data of the pages with a view.
 
-use crate::estimation::PartTime;
-use crate::geometry::{Pose, Vector};
-use crate::report::Metrics;
+use crate::Metrics;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_estimation::PartTime;
 
 /// The data of the page of a run. Times are in s since the first measurement.
 pub struct RunPage<'a> {

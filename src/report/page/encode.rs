@@ -6,8 +6,8 @@ use super::data::{
     SpringView, TimedPose, TimelineRow, View,
 };
 use super::quantise::cloud;
-use crate::geometry::{Pose, Vector};
 use serde_json::{Value, json};
+use zsim_base::geometry::{Pose, Vector};
 
 /// The data of a run as JSON that is inert within a `<script>` element: it has no `<`, `>` or `&`.
 ///

@@ -5,7 +5,7 @@ use super::encode;
 use super::html::{self, PagePlot, escaped};
 use super::scripts::{CHARTS, DATA, LIBRARIES, READY, TABLES};
 use super::table::PageTable;
-use crate::report::plot::PlotError;
+use crate::plot::PlotError;
 
 /// The page of a gain measurement: gain, phase and coherence of each axis over frequency.
 pub struct GainsPage {

@@ -1,8 +1,8 @@
 //! The parts of the page that are readable without scripts.
 
-use crate::estimation::PartTime;
-use crate::report::quantity::{percent, time};
-use crate::report::{CauseMetrics, EventMetrics, Metrics, rows, verdict};
+use crate::quantity::{percent, time};
+use crate::{CauseMetrics, EventMetrics, Metrics, rows, verdict};
+use zsim_estimation::PartTime;
 
 const SHELL: &str = include_str!("assets/page.html");
 const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));

@@ -24,7 +24,7 @@ mod study;
 mod table;
 mod update;
 
-use crate::report::rows;
+use crate::rows;
 pub use benchmark::BenchmarkPage;
 pub use data::{
     Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Level, Link, Ordinate, RunPage, Section,

@@ -2,8 +2,8 @@
 
 use super::binary::base64_bytes;
 use super::data::ViewPoint;
-use crate::geometry::Vector;
 use serde_json::{Value, json};
+use zsim_base::geometry::Vector;
 
 /// Code of a quantity that is not known.
 const UNKNOWN: u8 = 255;

@@ -3,7 +3,7 @@
 use super::data::View;
 use super::html::NamedValue;
 use super::{encode, html, scripts, stage};
-use crate::report::plot::{Figure, PlotError};
+use crate::plot::{Figure, PlotError};
 
 /// The page of a scene: its surfaces in three dimensions, a floor plan and its materials.
 pub struct ScenePage<'a> {

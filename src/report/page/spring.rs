@@ -5,7 +5,7 @@ use super::html::{self, NamedValue, escaped};
 use super::stage::Stage;
 use super::table::PageTable;
 use super::{encode, scripts};
-use crate::report::plot::PlotError;
+use crate::plot::PlotError;
 
 const SECTION: &str = include_str!("assets/spring.html");
 const CONTROLS: &str = include_str!("assets/modes.html");

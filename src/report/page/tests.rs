@@ -1,8 +1,8 @@
 //! Tests of the page: escaping, size and repeatability.
 
 use super::*;
-use crate::geometry::{Pose, Vector};
-use crate::report::{CauseMetrics, IntegrityMetrics, Metrics};
+use crate::{CauseMetrics, IntegrityMetrics, Metrics};
+use zsim_base::geometry::{Pose, Vector};
 
 const HOSTILE: &str = "</script><script>alert(1)</script>";
 /// Maximum size of a page, bytes.

@@ -5,9 +5,9 @@ use super::data::TimedPose;
 use super::encode::path;
 use super::html;
 use super::quantise::{positions, times};
-use crate::geometry::{Pose, Vector};
-use crate::report::{Metrics, verdict};
+use crate::{Metrics, verdict};
 use serde_json::{Value, json};
+use zsim_base::geometry::{Pose, Vector};
 
 /// Half the edge of the volume around the first pose if the scene is not known, m: coordinates have steps of 10 mm.
 const HALF_EDGE_M: f64 = 327.675;

@@ -132,7 +132,7 @@ fn downsampled(drawn: &[u8], wide: usize, side: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::plot::{BandPoint, Colour, Series};
+    use crate::plot::{BandPoint, Colour, Series};
 
     fn figure() -> Figure {
         let wave = (0..200).map(|k| (k as f64 * 0.1, (k as f64 * 0.1).sin())).collect();

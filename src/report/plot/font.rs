@@ -20,7 +20,7 @@ pub(super) const SVG_SIZE_PER_EM: f64 = 1.24;
 /// (1900 + 500) / 2048 em.
 pub(super) const BITMAP_SIZE_PER_EM: f64 = 1.172;
 
-static ROBOTO: &[u8] = include_bytes!("../../../assets/fonts/Roboto-Regular.ttf");
+static ROBOTO: &[u8] = include_bytes!("fonts/Roboto-Regular.ttf");
 
 /// Registers the font with plotters; repeated calls have no effect.
 pub(super) fn register() -> Result<(), PlotError> {

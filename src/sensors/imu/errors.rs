@@ -1,8 +1,8 @@
 use super::triad_model::TriadModel;
 use super::{Imu, InertialReading};
-use crate::geometry::{Matrix, Vector};
-use crate::random::{Seed, Stream};
 use rand_distr::{Distribution, StandardNormal};
+use zsim_base::geometry::{Matrix, Vector};
+use zsim_base::random::{Seed, Stream};
 
 /// Below this fraction of the limit, the mean over a sample shows that no axis saturated within the sample: a shock of a tenth of
 /// the sample that reaches the limit several times over exceeds it.

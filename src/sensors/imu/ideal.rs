@@ -1,10 +1,10 @@
-use crate::geometry::{Kinematics, Rotation, Vector, gravity_in_world};
-use crate::measurement::ImuAveraging;
+use zsim_base::geometry::{Kinematics, Rotation, Vector, gravity_in_world};
+use zsim_base::measurement::ImuAveraging;
 
 /// Duration of an instantaneous reading, s.
 ///
 /// A difference over it is consistent with the integrated motion; the angular velocity that a
-/// [`Track`](crate::sensors::Track) interpolates between its nodes differs from the derivative of the attitude by enough to
+/// [`Track`](crate::Track) interpolates between its nodes differs from the derivative of the attitude by enough to
 /// drift by millimetres in half a minute.
 const INSTANT_S: f64 = 1e-5;
 /// Subintervals of an interval for the mean in body axes and for saturation within the interval.

@@ -12,9 +12,9 @@ pub use ideal::{InertialReading, coning_corrected, ideal_reading};
 pub use sampler::ImuSampler;
 pub use spec::{AccelSpec, GaussMarkovSpec, GyroSpec, ImuSpec, OutputFilterSpec, WarmUpSpec};
 
-use crate::measurement::{ImuAveraging, ImuNoise};
-use crate::spec::{Source, SpecError};
 use triad_model::TriadModel;
+use zsim_base::measurement::{ImuAveraging, ImuNoise};
+use zsim_base::spec::{Source, SpecError};
 
 /// An inertial measurement unit.
 #[derive(Debug, Clone)]

@@ -3,9 +3,9 @@
 use super::filter::{OutputFilter, steps_per_sample};
 use super::ideal::{SUBINTERVALS, ideal_reading, parts};
 use super::{Imu, ImuErrors, InertialReading};
-use crate::geometry::Kinematics;
-use crate::measurement::ImuAveraging;
-use crate::random::Seed;
+use zsim_base::geometry::Kinematics;
+use zsim_base::measurement::ImuAveraging;
+use zsim_base::random::Seed;
 
 /// An IMU in one run: the ideal reading of each interval with errors, saturation and the output filter.
 #[derive(Debug, Clone)]

@@ -1,9 +1,9 @@
 use super::triad_model::{GaussMarkov, TriadModel, WarmUp};
-use crate::geometry::STANDARD_GRAVITY_M_PER_S2;
-use crate::measurement::ImuAveraging;
-use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
+use zsim_base::geometry::STANDARD_GRAVITY_M_PER_S2;
+use zsim_base::measurement::ImuAveraging;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked};
 
 /// Accepted sample rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
@@ -278,4 +278,9 @@ impl GaussMarkovSpec {
     fn model(&self, unit: f64) -> GaussMarkov {
         GaussMarkov { sigma: self.sigma * unit, time_s: self.time_s }
     }
+}
+
+impl NamedSpec for ImuSpec {
+    const KIND: Kind = Kind::Imu;
+    type Error = SpecError;
 }

@@ -1,7 +1,7 @@
 //! A beam of a lidar pattern.
 
-use crate::geometry::Vector;
-use crate::time::Span;
+use zsim_base::geometry::Vector;
+use zsim_base::time::Span;
 
 /// Maximum number of beams per scan: a guard against a typing error, and for memory.
 pub(super) const MAX_BEAMS: usize = 1 << 20;

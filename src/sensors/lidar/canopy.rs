@@ -1,6 +1,6 @@
 //! Where canopies stop a ray.
 
-use crate::sensors::CanopyPart;
+use crate::CanopyPart;
 
 /// Cosine of incidence on a leaf, the mean over leaves without preferred direction, each weighted with the area that it shows
 /// to the ray: the mean of cos^2 over that of cos.

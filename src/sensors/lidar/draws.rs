@@ -1,9 +1,9 @@
 //! Random numbers of the lidar.
 
 use super::MAX_RAYS;
-use crate::random::{Seed, Stream};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
+use zsim_base::random::{Seed, Stream};
 
 /// Random numbers of one scan. Each beam takes the same count from each stream, whether or not it hits a surface, so
 /// that a change at one beam does not change the noise of another. Numbers for canopies are drawn in scans that cross one.

@@ -1,9 +1,9 @@
 use super::draws::ScanDraws;
 use super::echo::Echo;
 use super::{Lidar, LidarErrorsSpec, Switch};
-use crate::measurement::LidarNoise;
-use crate::random::Seed;
 use rand_distr::{Distribution, StandardNormal};
+use zsim_base::measurement::LidarNoise;
+use zsim_base::random::Seed;
 
 /// Reflectance of the white target (Kent sheet) with which data sheets specify range.
 const WHITE_REFLECTANCE: f64 = 0.9;
@@ -99,8 +99,8 @@ fn octave_above(odds: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensors::LidarSpec;
-    use crate::spec::{Kind, find, parse};
+    use crate::LidarSpec;
+    use zsim_base::spec::{Kind, find, parse};
 
     #[test]
     fn octaves_decide_as_the_logistic_law() {

@@ -1,5 +1,5 @@
 use super::beam::{Beam, MAX_BEAMS};
-use crate::spec::{Source, SpecError};
+use zsim_base::spec::{Source, SpecError};
 
 /// A scan that takes several mirror turns, each offset by one step from the previous turn.
 #[derive(Debug, Clone, Copy)]

@@ -2,9 +2,9 @@
 
 use super::draws::ScanDraws;
 use super::{Beam, Lidar, LidarErrors, Sweep};
-use crate::geometry::Vector;
-use crate::measurement::{LidarReturn, LidarScan, PlanarScan};
-use crate::time::Span;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::{LidarReturn, LidarScan, PlanarScan};
+use zsim_base::time::Span;
 
 impl Lidar {
     /// The scan that the sensor reports for the ray intersections of `sweep`.

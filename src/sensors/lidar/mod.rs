@@ -17,12 +17,12 @@ pub use pattern::{Beam, PatternSpec};
 pub use spec::{BeamModel, DetectionSpec, GlassSpec, GrazingSpec, LidarErrorsSpec, LidarSpec, RangeNoiseSpec, Switch};
 pub use sweep::{ScanTiming, Sweep};
 
-use crate::geometry::{Rotation, Vector};
-use crate::measurement::LidarNoise;
-use crate::spec::{Source, SpecError};
-use crate::time::Span;
 use pattern::{Pattern, Plane};
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Rotation, Vector};
+use zsim_base::measurement::LidarNoise;
+use zsim_base::spec::{Source, SpecError};
+use zsim_base::time::Span;
 
 /// Maximum number of rays of a beam.
 const MAX_RAYS: usize = 7;

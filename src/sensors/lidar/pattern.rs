@@ -2,9 +2,9 @@ pub use super::beam::Beam;
 use super::beam::MAX_BEAMS;
 use super::interlaced::Interlaced;
 use super::rosette::Rosette;
-use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use zsim_base::spec::{Source, SpecError, checked};
 
 /// Directions and times of the beams of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -165,8 +165,8 @@ fn spinning(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Vector;
 
     fn source() -> Source {
         Source::in_memory("lidar.ron", "(\n pattern: planar(\n beams: 1441,\n))")

@@ -1,6 +1,6 @@
 use super::beam::{Beam, MAX_BEAMS};
-use crate::spec::{Source, SpecError};
 use std::f64::consts::TAU;
+use zsim_base::spec::{Source, SpecError};
 
 /// A non-repetitive pattern: beams evenly spaced in time on a curve that rotates about z while the elevation
 /// oscillates.

@@ -1,9 +1,9 @@
 use super::{Beam, PatternSpec};
-use crate::geometry::Vector;
-use crate::spec::{Source, SpecError, checked};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
+use zsim_base::geometry::Vector;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked};
 
 /// Accepted scan rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
@@ -210,4 +210,9 @@ impl LidarSpec {
         });
         (rays.collect(), &[0.5, TWELFTH, TWELFTH, TWELFTH, TWELFTH, TWELFTH, TWELFTH])
     }
+}
+
+impl NamedSpec for LidarSpec {
+    const KIND: Kind = Kind::Lidar;
+    type Error = SpecError;
 }

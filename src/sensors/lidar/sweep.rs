@@ -1,8 +1,8 @@
 use super::Lidar;
-use crate::geometry::Rotation;
-use crate::sensors::{CanopyPart, Scenery, SurfaceHit, Track};
-use crate::time::Stamp;
-use crate::world::{Ray, TimedRay};
+use crate::{CanopyPart, Scenery, SurfaceHit, Track};
+use zsim_base::geometry::Rotation;
+use zsim_base::time::Stamp;
+use zsim_world::{Ray, TimedRay};
 
 /// Maximum number of glass surfaces that a ray passes; a ray that hits more is lost.
 const MAX_GLASS: usize = 8;

@@ -1,7 +1,7 @@
 //! Checks of the keys of a fault.
 
 use super::{FaultKind, FaultSpec, FaultsSpec, FaultySensor};
-use crate::spec::{Source, SpecError};
+use zsim_base::spec::{Source, SpecError};
 
 /// Maximum number of faults: bounds the memory.
 const MAX_FAULTS: usize = 1000;

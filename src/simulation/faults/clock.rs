@@ -1,6 +1,6 @@
 use super::{FaultKind, FaultsSpec, FaultySensor};
-use crate::time::Span;
-use crate::truth::ClockTruth;
+use zsim_base::time::Span;
+use zsim_truth::ClockTruth;
 
 /// Offsets that faults add to the sensor clocks. Ground truth reports the clocks with these offsets.
 #[derive(Debug, Clone)]

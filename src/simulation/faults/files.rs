@@ -1,7 +1,7 @@
 //! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
-use crate::spec::{Kind, Source, SpecError, text_file};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, text_file};
 
 /// Maximum number of arrival times in a file: bounds the memory.
 const MAX_ARRIVALS: usize = 1_000_000;
@@ -49,4 +49,13 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
         }
     }
     Ok(arrivals_s)
+}
+
+impl NamedSpec for FaultsSpec {
+    const KIND: Kind = Kind::Faults;
+    type Error = SpecError;
+
+    fn resolved(self, source: &Source) -> Result<Self, SpecError> {
+        self.with_files(source)
+    }
 }

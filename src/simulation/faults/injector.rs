@@ -2,15 +2,15 @@ use super::clock::ClockFaults;
 use super::pipeline::Pipeline;
 use super::stage::Message;
 use super::{FaultKind, Faults};
-use crate::geometry::{Pose, Rotation, Vector, gravity_in_world};
-use crate::measurement::{ImuSample, LidarScan, Measurement, Sink, SinkError};
-use crate::simulation::{EPOCH, Rig};
-use crate::time::{Span, Stamp};
-use crate::truth::{ClockTruth, TruthSample, TruthSink};
+use crate::{EPOCH, Rig};
 use std::collections::{BTreeMap, VecDeque};
+use zsim_base::geometry::{Pose, Rotation, Vector, gravity_in_world};
+use zsim_base::measurement::{ImuSample, LidarScan, Measurement, Sink, SinkError};
+use zsim_base::time::{Span, Stamp};
+use zsim_truth::{ClockTruth, TruthSample, TruthSink};
 
 /// Applies faults to the data of a simulation, and passes the result to a sink in order of arrival.
-pub(in crate::simulation) struct Injector<'s, S: ?Sized> {
+pub(crate) struct Injector<'s, S: ?Sized> {
     sink: &'s mut S,
     imu: Pipeline,
     lidar: Pipeline,

@@ -1,5 +1,5 @@
 use super::FaultSpec;
-use crate::time::Span;
+use zsim_base::time::Span;
 
 /// When a fault is active, in true time since the start of the run; end times are exclusive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use super::FaultKind;
 use super::stage::{Message, Stage};
-use crate::random::Stream;
-use crate::time::{Span, Stamp};
 use rand::RngExt;
+use zsim_base::random::Stream;
+use zsim_base::time::{Span, Stamp};
 
 /// The stage of a fault of this group; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind, stream: &Stream) -> Option<Box<dyn Stage>> {

@@ -22,12 +22,12 @@ mod values;
 pub(super) use injector::Injector;
 pub use spec::{FaultKind, FaultSpec, FaultsSpec, FaultySensor, MissEncoding};
 
-use crate::geometry::{Pose, Vector, from_roll_pitch_yaw};
-use crate::measurement::Calibration;
-use crate::sensors::Lidar;
-use crate::spec::{Source, SpecError};
 use clock::ClockFaults;
 use interval::Interval;
+use zsim_base::geometry::{Pose, Vector, from_roll_pitch_yaw};
+use zsim_base::measurement::Calibration;
+use zsim_base::spec::{Source, SpecError};
+use zsim_sensors::Lidar;
 
 /// Checked faults.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -3,9 +3,9 @@
 use super::interval::Interval;
 use super::stage::{Message, Stage};
 use super::{FaultKind, Faults, loss, scan, timing, values};
-use crate::random::Seed;
-use crate::simulation::EPOCH;
-use crate::time::{Span, Stamp};
+use crate::EPOCH;
+use zsim_base::random::Seed;
+use zsim_base::time::{Span, Stamp};
 
 /// Time without messages after which a stage emits held messages: the message that they wait for may never come.
 const FLUSH_TIMEOUT: Span = Span::from_nanos(5_000_000_000);
@@ -89,10 +89,10 @@ fn flush(first: &mut TimedStage, rest: &mut [TimedStage], out: &mut Vec<Message>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::measurement::{ImuSample, Measurement};
-    use crate::simulation::FaultsSpec;
-    use crate::spec::{Source, parse};
+    use crate::FaultsSpec;
+    use zsim_base::geometry::Vector;
+    use zsim_base::measurement::{ImuSample, Measurement};
+    use zsim_base::spec::{Source, parse};
 
     /// The IMU pipeline with `list`.
     fn pipeline(list: &str) -> Pipeline {

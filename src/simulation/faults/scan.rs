@@ -2,8 +2,8 @@
 
 use super::stage::{Message, Stage};
 use super::{FaultKind, MissEncoding};
-use crate::measurement::{LidarReturn, LidarScan, Measurement, PlanarScan};
-use crate::time::Span;
+use zsim_base::measurement::{LidarReturn, LidarScan, Measurement, PlanarScan};
+use zsim_base::time::Span;
 
 /// Difference of the encoding `above_max` from the maximum range, m.
 const ABOVE_MAX_M: f32 = 1.0;

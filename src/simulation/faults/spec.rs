@@ -1,7 +1,7 @@
 //! Data of a faults file, `specs/faults/NAME.ron`.
 
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
 
 /// Faults of the sensors and of their delivery, applied in the order listed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]

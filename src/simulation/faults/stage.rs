@@ -1,9 +1,9 @@
 //! A measurement on its way from sensor to sink, and a stage that applies a fault to it.
 
-use crate::geometry::Vector;
-use crate::measurement::Measurement;
-use crate::simulation::EPOCH;
-use crate::time::{Span, Stamp};
+use crate::EPOCH;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::Measurement;
+use zsim_base::time::{Span, Stamp};
 
 /// A measurement between sensor and sink.
 #[derive(Debug, Clone)]

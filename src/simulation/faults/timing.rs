@@ -3,10 +3,10 @@
 use super::FaultKind;
 use super::interval::Interval;
 use super::stage::{Message, Stage};
-use crate::random::Stream;
-use crate::time::{Span, Stamp};
 use rand::RngExt;
 use rand_distr::{Distribution, Exp1};
+use zsim_base::random::Stream;
+use zsim_base::time::{Span, Stamp};
 
 /// The stage of a fault of this group; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind, stream: &Stream, interval: &Interval) -> Option<Box<dyn Stage>> {

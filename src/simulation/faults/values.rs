@@ -2,12 +2,12 @@
 
 use super::FaultKind;
 use super::stage::{Message, Stage};
-use crate::geometry::Vector;
-use crate::measurement::{ImuSample, Measurement};
-use crate::random::Stream;
-use crate::time::Span;
 use rand::RngExt;
 use std::collections::VecDeque;
+use zsim_base::geometry::Vector;
+use zsim_base::measurement::{ImuSample, Measurement};
+use zsim_base::random::Stream;
+use zsim_base::time::Span;
 
 /// The stage of a fault of this group, active from `from_s` to `to_s`, s after the start; `None` for other groups.
 pub(super) fn stage(kind: &FaultKind, stream: Stream, (from_s, to_s): (f64, f64)) -> Option<Box<dyn Stage>> {

@@ -1,7 +1,7 @@
 //! Figure of a lidar's coverage.
 
 use super::{Coverage, CoverageCell};
-use crate::report::plot::{Cell, Cells, Chart, Colour, Figure, Series, Tick};
+use zsim_report::plot::{Cell, Cells, Chart, Colour, Figure, Series, Tick};
 
 /// Fraction of the cells that saturate the colour scale.
 ///

@@ -13,13 +13,13 @@ pub use figure::coverage_figure;
 pub use result::{Coverage, CoverageCell, CoveragePlan, Density, GyroUsage};
 pub use table::{density_csv, over_time_csv};
 
-use crate::dynamics::{HeadModel, HeadState};
-use crate::geometry::Rotation;
-use crate::motion::BaseMotion;
-use crate::sensors::Lidar;
-use crate::study::StudyError;
+use crate::StudyError;
 use sphere::Sphere;
 use track::SwingTrack;
+use zsim_base::geometry::Rotation;
+use zsim_dynamics::{HeadModel, HeadState};
+use zsim_motion::BaseMotion;
+use zsim_sensors::Lidar;
 
 /// Maximum end of the observation, s: one hour takes about 200 MB of memory.
 const MAX_END_S: f64 = 3600.0;

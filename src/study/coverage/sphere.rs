@@ -1,8 +1,8 @@
 //! Histogram of beams over the sphere of directions, in cells of equal solid angle.
 
 use super::{CoverageCell, Density};
-use crate::geometry::Vector;
 use std::f64::consts::{PI, TAU};
+use zsim_base::geometry::Vector;
 
 /// Bands of equal height and thus (Archimedes) equal area.
 const BANDS: usize = 32;

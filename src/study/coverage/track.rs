@@ -1,10 +1,10 @@
 //! Recorded rotation of the lidar and rates of the gyroscope.
 
 use super::{CoveragePlan, GyroUsage};
-use crate::dynamics::{HeadModel, HeadSimulation, HeadState};
-use crate::geometry::{Rotation, Vector, roll_pitch_yaw};
-use crate::motion::BaseMotion;
-use crate::study::StudyError;
+use crate::StudyError;
+use zsim_base::geometry::{Rotation, Vector, roll_pitch_yaw};
+use zsim_dynamics::{HeadModel, HeadSimulation, HeadState};
+use zsim_motion::BaseMotion;
 
 /// A recorded swing, one entry per simulation step.
 #[derive(Debug, Clone)]

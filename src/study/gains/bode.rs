@@ -3,8 +3,8 @@
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::figure::{PANELS, dot_size, style};
 use super::{GainCurve, GainPoint};
-use crate::report::plot::{BandPoint, Chart, Figure, Mark, Series, Tick};
 use std::f64::consts::{PI, TAU};
+use zsim_report::plot::{BandPoint, Chart, Figure, Mark, Series, Tick};
 
 /// The lower edge of a band is at least this fraction of the gain: a logarithmic axis has no zero.
 pub(super) const LOWEST_SHARE: f64 = 0.01;

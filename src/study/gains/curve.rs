@@ -1,13 +1,13 @@
 //! Settings and result of a gain measurement.
 
-use crate::dynamics::AccelerationKind;
-use crate::dynamics::CoilContact;
-use crate::dynamics::GainPoints;
-use crate::dynamics::Peak;
-use crate::motion::Axis;
-use crate::random::Seed;
 use serde::Deserialize;
 use serde::Serialize;
+use zsim_base::random::Seed;
+use zsim_dynamics::AccelerationKind;
+use zsim_dynamics::CoilContact;
+use zsim_dynamics::GainPoints;
+use zsim_dynamics::Peak;
+use zsim_motion::Axis;
 
 /// Settings of a gain measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +111,7 @@ pub(super) const SIGMAS_95: f64 = 1.96;
 /// Minimum coherence of a plotted gain: below it noise and nonlinearity dominate.
 pub(super) const MIN_COHERENCE: f64 = 0.5;
 
-/// Key of an axis in files, whose words are in [`quantity_name`](crate::report::quantity_name): `x_rot` for the angular rate about x, `x` for the acceleration along x.
+/// Key of an axis in files, whose words are in [`quantity_name`](zsim_report::quantity_name): `x_rot` for the angular rate about x, `x` for the acceleration along x.
 pub fn axis_name(axis: Axis) -> &'static str {
     match axis {
         Axis::X => "x",

@@ -1,12 +1,12 @@
 //! Periodic motion of the base on a shaker, tabulated over one period.
 
 use super::GainPlan;
-use crate::dynamics::HeadModel;
-use crate::geometry::{Kinematics, Pose, Vector};
-use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, Phases, ShakerSpec, SignalSpec};
-use crate::spec::Source;
-use crate::study::StudyError;
+use crate::StudyError;
 use std::ops::RangeInclusive;
+use zsim_base::geometry::{Kinematics, Pose, Vector};
+use zsim_base::spec::Source;
+use zsim_dynamics::HeadModel;
+use zsim_motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, Phases, ShakerSpec, SignalSpec};
 
 /// Time in which the shaker reaches its full amplitude, s.
 const ONSET_S: f64 = 1.0;

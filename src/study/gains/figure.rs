@@ -2,8 +2,8 @@
 
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingPoint, SwingStudy};
-use crate::motion::Axis;
-use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series};
+use zsim_motion::Axis;
+use zsim_report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series};
 
 /// Panels of the paper's figure 3: title, label, axes.
 pub(super) const PANELS: [(&str, &str, &[Axis]); 3] = [

@@ -2,17 +2,17 @@
 
 use super::drive::{Schedule, ShakenBase};
 use super::{AXES, GainCurve, GainPlan, GainPoint};
-use crate::dynamics::{
-    AccelerationKind, CoilContact, ContactWatch, GainPoints, HeadModel, HeadSimulation, HeadState, Peak,
-};
-use crate::geometry::{Pose, Rotation, Vector};
-use crate::motion::Axis;
-use crate::signal::{Segments, TransferPoint, transfer_function};
-use crate::study::progress::{PieceProgress, check};
-use crate::study::{OnProgress, StudyError};
+use crate::progress::{PieceProgress, check};
+use crate::{OnProgress, StudyError};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 use std::sync::atomic::AtomicBool;
+use zsim_base::geometry::{Pose, Rotation, Vector};
+use zsim_base::signal::{Segments, TransferPoint, transfer_function};
+use zsim_dynamics::{
+    AccelerationKind, CoilContact, ContactWatch, GainPoints, HeadModel, HeadSimulation, HeadState, Peak,
+};
+use zsim_motion::Axis;
 
 /// Valid number of realisations: coherence requires at least two.
 const REALISATIONS: RangeInclusive<usize> = 2..=1000;

@@ -4,9 +4,9 @@
 //! period: a spectrum over one period has no leakage, and the quadratic distortion of the response, which is at sums and
 //! differences of two lines and therefore at even multiples, is not in the measured lines. The head is simulated until transients have decayed, then
 //! one period is recorded. Several realisations with different phases are averaged (H1 estimator, see
-//! [`transfer_function`](crate::signal::transfer_function)); nonlinearity differs between realisations, which lowers the
+//! [`transfer_function`](zsim_base::signal::transfer_function)); nonlinearity differs between realisations, which lowers the
 //! coherence and widens the confidence band. Each curve includes the closed form of the linearised head
-//! ([`FrequencyResponse`](crate::dynamics::FrequencyResponse)).
+//! ([`FrequencyResponse`](zsim_dynamics::FrequencyResponse)).
 
 mod bode;
 mod curve;
@@ -25,10 +25,10 @@ pub use page::page;
 pub use swing::{SwingPoint, SwingStudy, swing_study};
 pub use table::{csv, min_coherence, peak_table, swing_csv};
 
-use crate::dynamics::{DampingSpec, HeadSpec};
-use crate::motion::Axis;
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
+use zsim_dynamics::{DampingSpec, HeadSpec};
+use zsim_motion::Axis;
 
 /// A gain measurement along or about one axis, with the default amplitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -3,11 +3,11 @@
 use super::bode::LOWEST_SHARE;
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
 use super::{GainCurve, GainPoint, SwingStudy, axis_name, peak_table, swing_figure};
-use crate::dynamics::HeadModel;
-use crate::motion::Axis;
-use crate::report::page::{Abscissa, AxisGains, Chart, Curve, CurveStyle, GainsPage, Ordinate, PagePlot, PageTable};
-use crate::study::StudyError;
+use crate::StudyError;
 use std::f64::consts::TAU;
+use zsim_dynamics::HeadModel;
+use zsim_motion::Axis;
+use zsim_report::page::{Abscissa, AxisGains, Chart, Curve, CurveStyle, GainsPage, Ordinate, PagePlot, PageTable};
 
 /// Maximum number of frequencies of a chart; more are thinned, and the largest gain of each interval is kept.
 const MAX_LINES: usize = 2_000;

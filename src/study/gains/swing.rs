@@ -1,9 +1,9 @@
 //! Gains at large amplitudes, where the head is nonlinear: resonance and peak gain over swing amplitude.
 
 use super::{GainPlan, GainWatch, gain_curve};
-use crate::dynamics::{CoilContact, HeadModel, Peak};
-use crate::motion::Axis;
-use crate::study::StudyError;
+use crate::StudyError;
+use zsim_dynamics::{CoilContact, HeadModel, Peak};
+use zsim_motion::Axis;
 
 /// The resonance at one excitation amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

@@ -1,9 +1,9 @@
 //! Gain curves as CSV, and their peaks as a table.
 
 use super::{GainCurve, SwingStudy, axis_name};
-use crate::dynamics::Peak;
-use crate::report::quantity_name;
 use std::fmt::Write;
+use zsim_dynamics::Peak;
+use zsim_report::quantity_name;
 
 /// The highest peak of each curve, simulated and in closed form: header and one row per axis.
 pub fn peak_table(curves: &[GainCurve]) -> (Vec<String>, Vec<Vec<String>>) {

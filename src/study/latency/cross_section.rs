@@ -1,8 +1,8 @@
 //! A vertical cross-section through the map.
 
-use crate::geometry::{Trajectory, Vector};
-use crate::time::{Span, Stamp};
 use nalgebra::Matrix2;
+use zsim_base::geometry::{Trajectory, Vector};
+use zsim_base::time::{Span, Stamp};
 
 /// Half the thickness of the section, m: thin enough that walls appear as lines.
 const HALF_THICKNESS_M: f64 = 0.12;
@@ -79,8 +79,8 @@ fn rate_in_world(truth: &Trajectory, stamp: Stamp) -> Option<Vector> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Pose, from_roll_pitch_yaw};
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Pose, from_roll_pitch_yaw};
 
     /// Moves east along y = 2 m at 0.1 m/s, and pitches by 0.5 rad at 1 Hz.
     fn nodding() -> Trajectory {

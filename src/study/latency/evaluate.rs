@@ -3,17 +3,17 @@
 use super::reference::{Reference, SampledReturn};
 use super::stamp_errors::DisturbedStamps;
 use super::{ClockState, TimingSpec};
-use crate::estimation::{ClockSpec, Estimator, EstimatorSpec, OpenLoop, smoothed_stamps};
-use crate::evaluation::{CloudErrors, Errors, Pairs};
-use crate::geometry::{Pose, SmoothCursor, Trajectory, Vector};
-use crate::measurement::Calibration;
-use crate::recording::{Reader, Selection};
-use crate::simulation::Simulation;
-use crate::study::StudyError;
-use crate::study::sweep::Block;
-use crate::time::Stamp;
+use crate::StudyError;
+use crate::sweep::Block;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
+use zsim_base::geometry::{Pose, SmoothCursor, Trajectory, Vector};
+use zsim_base::measurement::Calibration;
+use zsim_base::time::Stamp;
+use zsim_estimation::{ClockSpec, Estimator, EstimatorSpec, OpenLoop, smoothed_stamps};
+use zsim_evaluation::{CloudErrors, Errors, Pairs};
+use zsim_recording::{Reader, Selection};
+use zsim_simulation::Simulation;
 
 /// Maximum distance from a point to a surface, m: points farther away are outliers.
 const REACH_M: f64 = 1.0;
@@ -43,7 +43,7 @@ pub struct Section {
 }
 
 /// A recording that is estimated with a timing error.
-pub(in crate::study) struct TimingRun<'a> {
+pub(crate) struct TimingRun<'a> {
     pub reader: &'a Reader,
     pub selection: &'a Selection,
     pub calibration: &'a Calibration,
@@ -169,7 +169,7 @@ fn with_known_jitter(estimator: &EstimatorSpec, noise_s: f64) -> EstimatorSpec {
 
 impl ClockState {
     /// Whether an estimator estimates clock errors.
-    pub(in crate::study) fn of(estimator: &EstimatorSpec) -> Self {
+    pub(crate) fn of(estimator: &EstimatorSpec) -> Self {
         if estimator.clock.estimated { Self::On } else { Self::Off }
     }
 }

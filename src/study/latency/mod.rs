@@ -20,11 +20,11 @@ mod spec;
 mod stamp_errors;
 
 pub use disturbance::{ClockState, Disturbance};
-pub(in crate::study) use evaluate::TimingRun;
+pub(crate) use evaluate::TimingRun;
 pub use evaluate::{MapErrors, Section};
 pub use figure::{curve_figure, map_figure};
 pub(super) use output::conclusions;
 pub use output::{csv, text_table};
-pub(in crate::study) use reference::Reference;
+pub(crate) use reference::Reference;
 pub use result::{LatencyResult, LatencyRun, Minimum, Recovery};
 pub use spec::TimingSpec;

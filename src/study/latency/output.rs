@@ -1,8 +1,7 @@
 //! Tables of a latency study.
 
 use super::{ClockState, Disturbance, LatencyResult, LatencyRun};
-use crate::report;
-use crate::study::sweep::ConfidenceInterval;
+use crate::sweep::ConfidenceInterval;
 use std::fmt::Write;
 
 /// CSV with one row per run: `latency_ms,noise_ms,clock_state` and the measures with their confidence limits.
@@ -47,11 +46,11 @@ pub fn text_table(study: &LatencyResult) -> String {
         study.block_s,
         conclusions(study).join("\n")
     );
-    format!("{}\n{}", report::table(&header, &rows, true), report::wrapped(&words, ""))
+    format!("{}\n{}", zsim_report::table(&header, &rows, true), zsim_report::wrapped(&words, ""))
 }
 
 /// Conclusions from the curves, one sentence each.
-pub(in crate::study) fn conclusions(study: &LatencyResult) -> Vec<String> {
+pub(crate) fn conclusions(study: &LatencyResult) -> Vec<String> {
     let at = |minimum: Option<ConfidenceInterval>| match minimum {
         Some(ConfidenceInterval { value, low, high }) => format!("at {value:+.3} ms (95 %: {low:+.3} to {high:+.3})"),
         None => "at no latency (no minimum)".to_owned(),

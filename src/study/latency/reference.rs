@@ -1,18 +1,18 @@
 //! Ground truth and a sample of the lidar's returns, which all runs are evaluated against.
 
 use super::cross_section::CrossSection;
-use crate::evaluation::Thinning;
-use crate::geometry::{Pose, Trajectory, Vector};
-use crate::measurement::{Calibration, LidarScan, Measurement};
-use crate::recording::{Reader, Selection};
-use crate::simulation::Simulation;
-use crate::study::StudyError;
-use crate::study::cloud::Surroundings;
-use crate::study::true_clock::TrueClock;
-use crate::study::truth_cursor::TruthCursor;
-use crate::time::{Span, Stamp};
+use crate::StudyError;
+use crate::cloud::Surroundings;
+use crate::true_clock::TrueClock;
+use crate::truth_cursor::TruthCursor;
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
+use zsim_base::geometry::{Pose, Trajectory, Vector};
+use zsim_base::measurement::{Calibration, LidarScan, Measurement};
+use zsim_base::time::{Span, Stamp};
+use zsim_evaluation::Thinning;
+use zsim_recording::{Reader, Selection};
+use zsim_simulation::Simulation;
 
 /// Approximate number of returns for the cloud's errors: the computing time of an evaluation is proportional to it.
 const EVALUATED_RETURNS: usize = 60_000;
@@ -45,7 +45,7 @@ pub(super) struct SampledReturn {
 }
 
 /// Ground truth and sampled returns of the recording.
-pub(in crate::study) struct Reference {
+pub(crate) struct Reference {
     /// `world_from_head` in lidar time.
     pub(super) truth: Trajectory,
     /// True offset of the clocks.
@@ -66,7 +66,7 @@ pub(in crate::study) struct Reference {
 
 impl Reference {
     /// Reads the recording of `simulation`; the section has the returns of the middle `shown_s`.
-    pub(in crate::study) fn read(
+    pub(crate) fn read(
         reader: &Reader,
         selection: &Selection,
         calibration: &Calibration,

@@ -1,7 +1,7 @@
 //! Result of a latency study.
 
 use super::{ClockState, Disturbance, MapErrors, Section};
-use crate::study::sweep::{Block, ConfidenceInterval, Journey, Resampling, pooled};
+use crate::sweep::{Block, ConfidenceInterval, Journey, Resampling, pooled};
 use serde::Serialize;
 
 /// Result of one run with its confidence intervals.
@@ -71,7 +71,7 @@ pub struct LatencyResult {
 
 impl LatencyResult {
     /// Summarises the runs of a sweep, in its order; `None` without runs, or if two have the same timing.
-    pub(in crate::study) fn of(runs: &[(Journey, MapErrors)]) -> Option<Self> {
+    pub(crate) fn of(runs: &[(Journey, MapErrors)]) -> Option<Self> {
         let (first, errors) = runs.first()?;
         let (inputs, timing) = (&first.simulation, first.timing?);
         let resampling = Resampling::new(errors.blocks.len(), inputs.seed);

@@ -1,8 +1,8 @@
 //! Timing errors of a run, and settings of the evaluation of its map.
 
 use super::Disturbance;
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
 
 /// Maximum magnitude of latency and noise, ms: the search range of the clock estimation.
 const MAX_TIMING_ERROR_MS: f64 = 20.0;

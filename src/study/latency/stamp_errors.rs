@@ -1,12 +1,12 @@
 //! Timing errors, added to the stamps of a recording before estimation.
 
 use super::Disturbance;
-use crate::measurement::Measurement;
-use crate::random::Seed;
-use crate::recording::RecordingError;
-use crate::study::true_clock::TrueClock;
-use crate::time::{Span, Stamp};
+use crate::true_clock::TrueClock;
 use rand_distr::{Distribution, StandardNormal};
+use zsim_base::measurement::Measurement;
+use zsim_base::random::Seed;
+use zsim_base::time::{Span, Stamp};
+use zsim_recording::RecordingError;
 
 /// Stamps with timing errors, as the estimator receives them.
 #[derive(Debug, Clone)]
@@ -23,7 +23,7 @@ impl<'a> DisturbedStamps<'a> {
     /// Applies `disturbance` to otherwise synchronised clocks.
     ///
     /// Noise does not change the order of scans, as a driver publishes them with increasing stamps: scan `k` gets the
-    /// `k`-th smallest noisy stamp, as in [`Stamper`](crate::sensors::Stamper). The same random numbers, scaled, are used
+    /// `k`-th smallest noisy stamp, as in [`Stamper`](zsim_sensors::Stamper). The same random numbers, scaled, are used
     /// for every standard deviation.
     pub(super) fn new(disturbance: Disturbance, clock: &'a TrueClock, scan_stamps: &[Stamp], seed: Seed) -> Self {
         let mut draws = seed.stream("latency/noise");
@@ -66,8 +66,8 @@ impl<'a> DisturbedStamps<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vector;
-    use crate::measurement::{ImuSample, LidarScan};
+    use zsim_base::geometry::Vector;
+    use zsim_base::measurement::{ImuSample, LidarScan};
 
     fn at(us: i64) -> Stamp {
         Stamp::from_nanos(us * 1000)

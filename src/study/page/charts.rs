@@ -2,13 +2,13 @@
 
 use super::RunResults;
 use super::paths::TurnRates;
-use crate::estimation::WindowReport;
-use crate::evaluation::Errors;
-use crate::geometry::Vector;
-use crate::report::LengthUnit;
-use crate::report::page::{Abscissa, Chart, ChartGroup, Curve, CurveStyle, Ordinate, Section};
-use crate::study::integrity::Integrity;
-use crate::time::Stamp;
+use crate::integrity::Integrity;
+use zsim_base::geometry::Vector;
+use zsim_base::time::Stamp;
+use zsim_estimation::WindowReport;
+use zsim_evaluation::Errors;
+use zsim_report::LengthUnit;
+use zsim_report::page::{Abscissa, Chart, ChartGroup, Curve, CurveStyle, Ordinate, Section};
 
 /// Maximum number of times of a chart: about three for each pixel of its width.
 const MAX_TIMES: usize = 3000;

@@ -2,11 +2,11 @@
 
 use super::RunResults;
 use super::paths::TurnRates;
-use crate::geometry::{Pose, Vector};
-use crate::recording::CloudPoint;
-use crate::report::page::ViewPoint;
-use crate::world::World;
 use rayon::prelude::*;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_recording::CloudPoint;
+use zsim_report::page::ViewPoint;
+use zsim_world::World;
 
 /// Maximum distance from a point to its true surface, m.
 const MAX_DISTANCE_M: f64 = 1.0;

@@ -1,9 +1,9 @@
 //! Parts, springs and cords of a head, as the view draws them.
 
-use crate::dynamics::{ElementSpec, LinkageSpec, PartSpec, PlacementSpec};
-use crate::elasticity::SpringSpec;
-use crate::geometry::Vector;
-use crate::report::page::{Block, Link};
+use zsim_base::geometry::Vector;
+use zsim_dynamics::{ElementSpec, LinkageSpec, PartSpec, PlacementSpec};
+use zsim_elasticity::SpringSpec;
+use zsim_report::page::{Block, Link};
 
 /// Dimensions with which a spring is drawn if only its stiffness is known.
 struct DrawnCoil {
@@ -15,7 +15,7 @@ struct DrawnCoil {
 const ASSUMED_COIL: DrawnCoil = DrawnCoil { radius_m: 0.0125, wire_diameter_m: 0.002, coils: 10.0 };
 
 /// The elements between base and head; empty for a rigid or actuated mount.
-pub(in crate::study) fn of(linkage: &LinkageSpec) -> Vec<Link> {
+pub(crate) fn of(linkage: &LinkageSpec) -> Vec<Link> {
     match linkage {
         LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => Vec::new(),
         LinkageSpec::Spring { spring: spec, base_from_spring, head_from_spring, .. } => {
@@ -26,7 +26,7 @@ pub(in crate::study) fn of(linkage: &LinkageSpec) -> Vec<Link> {
 }
 
 /// The blocks among the parts of a head; bodies have no shape.
-pub(in crate::study) fn blocks(parts: &[PartSpec]) -> Vec<Block> {
+pub(crate) fn blocks(parts: &[PartSpec]) -> Vec<Block> {
     let block = |part: &PartSpec| match part {
         PartSpec::Block { size_m, centre_m, .. } => {
             Some(Block { centre_in_head: Vector::from(*centre_m), size_m: Vector::from(*size_m) })
@@ -37,7 +37,7 @@ pub(in crate::study) fn blocks(parts: &[PartSpec]) -> Vec<Block> {
 }
 
 /// Whether a spring of the linkage is specified by stiffness only, and therefore drawn with assumed dimensions.
-pub(in crate::study) fn is_assumed(linkage: &LinkageSpec) -> bool {
+pub(crate) fn is_assumed(linkage: &LinkageSpec) -> bool {
     let by_stiffness = |spec: &SpringSpec| matches!(spec.resolved(), Ok(SpringSpec::Stiffness { .. }));
     match linkage {
         LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => false,

@@ -8,13 +8,13 @@ mod run_results;
 mod timeline;
 
 use super::sampled_truth::SampledTruth;
-use crate::geometry::{Pose, Vector};
-use crate::report::Metrics;
-use crate::report::page::{MAX_PAGE_TRIANGLES, RunPage, View};
-use crate::time::Stamp;
-use crate::world::World;
 pub(super) use links::{blocks as blocks_of, of as links_of};
 pub(super) use run_results::RunResults;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_base::time::Stamp;
+use zsim_report::Metrics;
+use zsim_report::page::{MAX_PAGE_TRIANGLES, RunPage, View};
+use zsim_world::World;
 
 impl RunResults<'_> {
     /// Gathers the data of the page.

@@ -1,9 +1,9 @@
 //! Paths of head and base, and angular velocity of the head.
 
 use super::RunResults;
-use crate::geometry::{Pose, Trajectory};
-use crate::report::page::{MAX_PAGE_POSES, TimedPose};
-use crate::time::{Span, Stamp};
+use zsim_base::geometry::{Pose, Trajectory};
+use zsim_base::time::{Span, Stamp};
+use zsim_report::page::{MAX_PAGE_POSES, TimedPose};
 
 /// Maximum rate of the poses: a dozen in a period of the fastest mode that is visible.
 const MAX_RATE_HZ: f64 = 50.0;

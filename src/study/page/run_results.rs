@@ -5,13 +5,13 @@ use super::super::integrity::Integrity;
 use super::super::open_loop::OpenLoopRun;
 use super::super::origin::Origin;
 use super::super::sampled_truth::SampledTruth;
-use crate::evaluation::Errors;
-use crate::evaluation::InformationBound;
-use crate::evaluation::Pairs;
-use crate::recording::CloudPoint;
+use zsim_evaluation::Errors;
+use zsim_evaluation::InformationBound;
+use zsim_evaluation::Pairs;
+use zsim_recording::CloudPoint;
 
 /// Results of a run, from which the page is made.
-pub(in crate::study) struct RunResults<'a> {
+pub(crate) struct RunResults<'a> {
     pub origin: &'a Origin<'a>,
     pub open: &'a OpenLoopRun,
     /// The truth at the stamps of the estimate, if it is known.

@@ -1,12 +1,12 @@
 //! The timeline of events.
 
-use crate::estimation::{Warning, WarningKind};
-use crate::report::CauseMetrics;
-use crate::report::page::{Interval, Level, TimelineRow};
-use crate::study::events::is_loss;
-use crate::study::open_loop::OpenLoopRun;
-use crate::time::Stamp;
+use crate::events::is_loss;
+use crate::open_loop::OpenLoopRun;
 use std::collections::BTreeMap;
+use zsim_base::time::Stamp;
+use zsim_estimation::{Warning, WarningKind};
+use zsim_report::CauseMetrics;
+use zsim_report::page::{Interval, Level, TimelineRow};
 
 /// Windows with the same problem within this time are one event, s.
 const MERGED_WITHIN_S: f64 = 0.5;

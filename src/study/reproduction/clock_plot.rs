@@ -1,8 +1,8 @@
 //! Plot of the clock offsets of the runs of a study over time.
 
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
-use crate::study::StudyError;
-use crate::study::sweep::{AxisSpec, ClockCurve, Sweep};
+use crate::StudyError;
+use crate::sweep::{AxisSpec, ClockCurve, Sweep};
+use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// Colours of the levels; further levels repeat them.
 const COLOURS: [Colour; 5] = [Colour::Estimate, Colour::Second, Colour::Third, Colour::Fourth, Colour::Fifth];

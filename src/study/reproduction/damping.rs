@@ -1,14 +1,14 @@
 //! Fit of a head's damping ratios to the peak gains in the paper.
 
 use super::PeaksSpec;
-use crate::dynamics::{AccelerationKind, DampingSpec, HeadModel, HeadSpec, Peak};
-use crate::motion::Axis;
-use crate::random::Seed;
-use crate::spec::Source;
-use crate::study::StudyError;
-use crate::study::gains::{AXES, with_damping};
+use crate::StudyError;
+use crate::gains::{AXES, with_damping};
 use cmaes::{CMAESOptions, DVector};
 use serde::{Deserialize, Serialize};
+use zsim_base::random::Seed;
+use zsim_base::spec::Source;
+use zsim_dynamics::{AccelerationKind, DampingSpec, HeadModel, HeadSpec, Peak};
+use zsim_motion::Axis;
 
 /// Budget of the fit: evaluations of the closed form's peaks, 120 generations.
 const MAX_EVALUATIONS: usize = 1200;

@@ -1,12 +1,12 @@
 //! An experiment: its spec, its run, and its stored result.
 
 use super::{ExperimentResult, ExperimentSpec, Extent, RunsSpec, gain_curves, runs, timing};
-use crate::spec::{Kind, Source, find, names, parse, to_text};
-use crate::study::StudyError;
-use crate::study::atomic_file::write_text;
-use crate::study::sweep::{ContentHash, MergedReport, Plan, Runner, Shard, Sweep, SweepSpec};
+use crate::StudyError;
+use crate::atomic_file::write_text;
+use crate::sweep::{ContentHash, MergedReport, Plan, Runner, Shard, Sweep, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use zsim_base::spec::{Kind, Source, find, names, parse, to_text};
 
 /// File with the result, which is written last.
 const RESULT_FILE: &str = "finding.ron";

@@ -5,16 +5,15 @@ use super::{
     ComparedNumber, Comparison, DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping,
     gain_plots,
 };
-use crate::dynamics::{DampingSpec, HeadSpec, Peak};
-use crate::motion::Axis;
-use crate::simulation::Named;
-use crate::spec::{self, Source};
-use crate::study::StudyError;
-use crate::study::atomic_file::write_text;
-use crate::study::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
-use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
+use crate::StudyError;
+use crate::atomic_file::write_text;
+use crate::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
+use crate::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
 use std::path::Path;
+use zsim_base::spec::{self, Named, Source};
+use zsim_dynamics::{DampingSpec, HeadSpec, Peak};
+use zsim_motion::Axis;
 
 /// Fits the damping of the heads, measures their gains, draws figures, and compares with the paper.
 pub(super) fn run(

@@ -1,8 +1,8 @@
 //! Plots of figure 3: one column per design with the paper's three panels.
 
 use super::head_response::HeadResponse;
-use crate::report::plot::{Chart, Figure};
-use crate::study::gains::{GainCurve, coherence_panels, gain_panels};
+use crate::gains::{GainCurve, coherence_panels, gain_panels};
+use zsim_report::plot::{Chart, Figure};
 
 /// Gain curves: simulation as dots, closed form as lines.
 pub(super) fn gains(responses: &[HeadResponse<'_>], up_to_hz: f64) -> Figure {

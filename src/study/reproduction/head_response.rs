@@ -2,7 +2,7 @@
 
 use super::damping::DampingFit;
 use super::spec::DesignedSpec;
-use crate::study::gains::GainCurve;
+use crate::gains::GainCurve;
 
 /// A head with fitted damping and its gain curves.
 pub(super) struct HeadResponse<'a> {

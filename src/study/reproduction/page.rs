@@ -1,9 +1,9 @@
 //! The page of the paper's experiments.
 
 use super::{ComparedNumber, Comparison, Extent, Finding, Verdict};
-use crate::report::page::{ExperimentSection, PageLink, PagePlot, PageTable, PaperPage};
-use crate::study::StudyError;
+use crate::StudyError;
 use std::path::Path;
+use zsim_report::page::{ExperimentSection, PageLink, PagePlot, PageTable, PaperPage};
 
 /// The page of all experiments as HTML; `folder` has the folder of each, and the page belongs in it.
 ///

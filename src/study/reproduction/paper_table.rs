@@ -1,7 +1,6 @@
 //! The table of the paper's experiments.
 
 use super::{Comparison, Extent, Finding};
-use crate::report;
 
 /// First line of [`paper_table`]; identifies a file written by `zsim reproduce`.
 pub const TABLE_HEADING: &str = "# The paper's experiments, reproduced";
@@ -30,7 +29,7 @@ pub fn paper_table(findings: &[Finding], extent: Extent, options: &str, label: O
         })
     });
     let header = ["figure", "quantity", "paper", "goal", "zsim, median", "worst", "zsim / paper", "goal is", "command"];
-    text += &report::markdown(&header, &rows.collect::<Vec<_>>());
+    text += &zsim_report::markdown(&header, &rows.collect::<Vec<_>>());
     for Finding { experiment, result } in findings {
         let notes = result.as_ref().map(|result| result.notes.clone());
         let notes = notes.unwrap_or_else(|| vec!["Not finished yet.".to_owned()]);

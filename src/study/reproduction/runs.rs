@@ -3,9 +3,9 @@
 use super::comparison::{rounded, with_unit};
 use super::spec::{ClaimSpec, ResultSpec, RunsSpec, WarningSpec};
 use super::{ComparedNumber, Comparison, ExperimentResult, clock_plot};
-use crate::study::StudyError;
-use crate::study::integrity::large_error_m;
-use crate::study::sweep::{Measure, Sweep};
+use crate::StudyError;
+use crate::integrity::large_error_m;
+use crate::sweep::{Measure, Sweep};
 use std::path::Path;
 
 /// Draws the figure of an experiment that has one in `folder`.

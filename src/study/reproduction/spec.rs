@@ -1,13 +1,13 @@
 //! Spec of an experiment: `specs/experiments/NAME.ron`.
 
 use super::Extent;
-use crate::dynamics::HeadSpec;
-use crate::motion::Axis;
-use crate::spec::{Kind, Source, SpecError, checked, find_from, parse};
-use crate::study::gains::AXES;
-use crate::study::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
+use crate::gains::AXES;
+use crate::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
+use zsim_base::spec::{Kind, Source, SpecError, checked, find_from, parse};
+use zsim_dynamics::HeadSpec;
+use zsim_motion::Axis;
 
 /// An experiment of the paper.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

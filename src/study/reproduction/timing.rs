@@ -1,8 +1,8 @@
 //! Figure 4 of the paper: latency and timing noise.
 
 use super::{ComparedNumber, Comparison, ExperimentResult};
-use crate::study::StudyError;
-use crate::study::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
+use crate::StudyError;
+use crate::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
 use std::path::Path;
 
 /// What the paper shows of a map with latency.

@@ -1,10 +1,10 @@
 //! The page of a scene.
 
 use super::plan::{DEFAULT_CUT_M, plan};
-use crate::geometry::{Pose, Route, Vector};
-use crate::report::page::{MAX_PAGE_TRIANGLES, MaterialRow, NamedValue, ScenePage, TimedPose, View};
-use crate::study::StudyError;
-use crate::world::{MaterialId, World};
+use crate::StudyError;
+use zsim_base::geometry::{Pose, Route, Vector};
+use zsim_report::page::{MAX_PAGE_TRIANGLES, MaterialRow, NamedValue, ScenePage, TimedPose, View};
+use zsim_world::{MaterialId, World};
 
 /// Speed along the route when the view plays it, m/s.
 const WALK_M_PER_S: f64 = 1.0;

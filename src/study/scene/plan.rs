@@ -1,9 +1,9 @@
 //! Floor plan and elevation of a scene.
 
-use crate::geometry::{Route, Vector};
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
-use crate::world::{SectionPlane, Segment, World};
 use std::collections::BTreeMap;
+use zsim_base::geometry::{Route, Vector};
+use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
+use zsim_world::{SectionPlane, Segment, World};
 
 /// Height of the cut above the route's floor, m, as of an architect's plan.
 pub const DEFAULT_CUT_M: f64 = 1.2;

@@ -1,10 +1,10 @@
 //! The heaviest head on a linkage: the mass at which the head falls or the wire of its spring yields.
 
 use super::model::SpringModel;
-use crate::dynamics::{Body, HeadSpec, HeadState, MassLimit, max_head_mass};
-use crate::geometry::{Kinematics, Pose};
-use crate::spec::Source;
-use crate::study::StudyError;
+use crate::StudyError;
+use zsim_base::geometry::{Kinematics, Pose};
+use zsim_base::spec::Source;
+use zsim_dynamics::{Body, HeadSpec, HeadState, MassLimit, max_head_mass};
 
 /// The maximum mass of a head with the shape of `spec` that has a stable rest pose, with a stress at rest below the yield
 /// stress of the wire.

@@ -1,8 +1,8 @@
 //! Modes with their amplitudes in a response, along the axes where the coils leave their directions open.
 
-use crate::dynamics::Mode;
-use crate::elasticity::split;
 use nalgebra::Complex;
+use zsim_dynamics::Mode;
+use zsim_elasticity::split;
 
 /// Two modes of the same kind whose frequencies differ by less than this fraction are shown along the axes.
 ///
@@ -57,9 +57,9 @@ fn turned(a: &ExcitedMode, b: &ExcitedMode) -> [ExcitedMode; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{HeadModel, load};
-    use crate::elasticity::Vector6;
     use approx::assert_relative_eq;
+    use zsim_dynamics::{HeadModel, load};
+    use zsim_elasticity::Vector6;
 
     #[test]
     fn close_modes_are_turned_to_the_axes_without_a_change_of_the_response() {

@@ -88,9 +88,9 @@ impl StressRange {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::elasticity::Material;
-    use crate::geometry::Vector;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::Vector;
+    use zsim_elasticity::Material;
 
     const WIRE: Wire = Wire { coil_radius_m: 0.0125, diameter_m: 0.003, material: Material::SpringSteel };
 

@@ -3,9 +3,9 @@
 use super::fatigue::{StressCycle, StressRange};
 use super::model::{SpringModel, WoundSpring, at_rest};
 use super::wire::{SpringMounting, WireLoad};
-use crate::dynamics::{CoilGap, EndLoad, HeadModel, HeadState, SpringEndLoads};
-use crate::elasticity::{Coil, SectionLoad, buckling_load_n};
 use serde::Serialize;
+use zsim_dynamics::{CoilGap, EndLoad, HeadModel, HeadState, SpringEndLoads};
+use zsim_elasticity::{Coil, SectionLoad, buckling_load_n};
 
 /// Margins of a coil spring over the observed states, of several springs the smallest: what is available over what is needed;
 /// above 1 is safe.
@@ -199,11 +199,11 @@ fn section_load(load: &WireLoad) -> SectionLoad {
 #[cfg(test)]
 mod tests {
     use super::super::{MISSION_HOURS, Shake, closed_form, simulated};
-    use crate::dynamics::{ElementSpec, HeadModel, LinkageSpec, PlacementSpec, SpringElementSpec, load};
-    use crate::sensors::Lidar;
-    use crate::spec::{Kind, find, parse};
-    use crate::study::coverage::CoveragePlan;
+    use crate::coverage::CoveragePlan;
     use approx::assert_relative_eq;
+    use zsim_base::spec::{Kind, find, parse};
+    use zsim_dynamics::{ElementSpec, HeadModel, LinkageSpec, PlacementSpec, SpringElementSpec, load};
+    use zsim_sensors::Lidar;
 
     fn utm30lx() -> Lidar {
         let source = find(Kind::Lidar, "utm30lx").unwrap();

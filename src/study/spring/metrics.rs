@@ -3,19 +3,19 @@
 use super::Shake;
 use super::margins::{LoadRecord, SpringMargins};
 use super::model::SpringModel;
-use crate::dynamics::{AccelerationKind, CoilGaps, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState};
-use crate::elasticity::split;
-use crate::geometry::{Kinematics, Pose, Rotation, Vector};
-use crate::motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
-use crate::random::Seed;
-use crate::sensors::Lidar;
-use crate::spec::Source;
-use crate::study::StudyError;
-use crate::study::coverage::{Coverage, CoveragePlan, coverage};
-use crate::study::sweep::Measure;
+use crate::StudyError;
+use crate::coverage::{Coverage, CoveragePlan, coverage};
+use crate::sweep::Measure;
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector};
+use zsim_base::random::Seed;
+use zsim_base::spec::Source;
+use zsim_dynamics::{AccelerationKind, CoilGaps, FrequencyResponse, GainPoints, HeadModel, HeadSpec, HeadState};
+use zsim_elasticity::split;
+use zsim_motion::{Axis, BaseMotion, DriveSpec, Level, MotionSpec, ShakerSpec, SignalSpec};
+use zsim_sensors::Lidar;
 
 /// Metrics of a head on a spring under a [`Shake`] of the base.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -206,7 +206,7 @@ impl LinearSwing<'_> {
     /// Velocities are set to zero: centrifugal and gyroscopic loads are of second order in the amplitude.
     fn state(&self, phase: f64) -> HeadState {
         let phasor = Complex::from_polar(1.0, phase);
-        let displacement = crate::elasticity::Vector6::from(self.amplitude().map(|a| (a * phasor).re));
+        let displacement = zsim_elasticity::Vector6::from(self.amplitude().map(|a| (a * phasor).re));
         let (shift, turn) = split(&displacement);
         let rest = self.head.base_from_head_at_rest();
         let centre_in_head = self.head.body().centre_of_mass_in_head;

@@ -2,10 +2,10 @@
 
 use super::outline::{Link, edges};
 use super::view_plane::{Polyline, ViewPlane};
-use crate::dynamics::{HeadModel, HeadSpec, Mode, ModeKind};
-use crate::elasticity::{Vector6, split};
-use crate::geometry::{Pose, Rotation};
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
+use zsim_base::geometry::{Pose, Rotation};
+use zsim_dynamics::{HeadModel, HeadSpec, Mode, ModeKind};
+use zsim_elasticity::{Vector6, split};
+use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// Displayed amplitude: rotation in rad, or translation in units of 0.1 m.
 const DISPLAYED_AMPLITUDE: f64 = 0.3;

@@ -1,8 +1,8 @@
 //! Names of modes in words.
 
-use crate::dynamics::{Mode, ModeKind};
-use crate::elasticity::split;
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
+use zsim_dynamics::{Mode, ModeKind};
+use zsim_elasticity::split;
 
 /// A direction within this angle of an axis, or of the horizontal plane, counts as along it, degrees.
 const TOLERANCE_DEG: f64 = 10.0;
@@ -52,7 +52,7 @@ fn direction(along: &Vector) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::elasticity::stack;
+    use zsim_elasticity::stack;
 
     fn name(kind: ModeKind, shift: [f64; 3], turn: [f64; 3]) -> String {
         let shape = stack(&Vector::from(shift), &Vector::from(turn));

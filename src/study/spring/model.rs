@@ -1,10 +1,10 @@
 //! The spring of a head: coil, wire and mounting.
 
 use super::wire::{SpringMounting, Wire};
-use crate::dynamics::{Body, DynamicsError, ElementSpec, HeadModel, HeadSpec, HeadState, LinkageSpec};
-use crate::elasticity::{Coil, SpringDesign, SpringSpec};
-use crate::geometry::{Kinematics, Pose};
-use crate::study::StudyError;
+use crate::StudyError;
+use zsim_base::geometry::{Kinematics, Pose};
+use zsim_dynamics::{Body, DynamicsError, ElementSpec, HeadModel, HeadSpec, HeadState, LinkageSpec};
+use zsim_elasticity::{Coil, SpringDesign, SpringSpec};
 
 /// A coil of a head with its wire; each is `None` for a spring given by its stiffness.
 #[derive(Debug, Clone, Copy)]

@@ -2,10 +2,10 @@
 
 use super::Wire;
 use super::view_plane::{Polyline, ViewPlane};
-use crate::dynamics::{ElementSpec, LinkageSpec, PartSpec};
-use crate::elasticity::{SpringDesign, SpringSpec};
-use crate::geometry::{Pose, Vector};
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_dynamics::{ElementSpec, LinkageSpec, PartSpec};
+use zsim_elasticity::{SpringDesign, SpringSpec};
 
 /// Number of segments of the drawing of a spring.
 const POINTS: usize = 240;

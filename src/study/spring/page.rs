@@ -3,13 +3,13 @@
 use super::excited_mode::{ExcitedMode, along_axes};
 use super::mode_figure::{displayed_shape, ratio};
 use super::{CoilReport, RestReport, Shake, SpringReport, mode_name, mode_table, properties, stiffness_table};
-use crate::dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, PartSpec};
-use crate::elasticity::SpringDesign;
-use crate::geometry::{Pose, Vector};
-use crate::motion::Axis;
-use crate::report::page::{NamedValue, NotedTable, PageTable, ShownMode, SpringPage, SpringView};
-use crate::study::StudyError;
-use crate::study::page::links;
+use crate::StudyError;
+use crate::page::links;
+use zsim_base::geometry::{Pose, Vector};
+use zsim_dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, PartSpec};
+use zsim_elasticity::SpringDesign;
+use zsim_motion::Axis;
+use zsim_report::page::{NamedValue, NotedTable, PageTable, ShownMode, SpringPage, SpringView};
 
 /// The page as HTML; the same report gives the same bytes.
 ///
@@ -140,7 +140,7 @@ fn unloaded_pose(linkage: &LinkageSpec) -> Result<Pose, StudyError> {
         | LinkageSpec::Actuated { base_from_head, .. }
         | LinkageSpec::Suspension { base_from_head, .. } => base_from_head.pose(),
         LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } => {
-            let length_m = match spring.design().map_err(crate::dynamics::DynamicsError::from)? {
+            let length_m = match spring.design().map_err(zsim_dynamics::DynamicsError::from)? {
                 SpringDesign::Coil(coil) => coil.free_length_m() + 2.0 * spring.end_length_m()?,
                 SpringDesign::Stiffness { length_m, .. } => length_m,
             };
@@ -207,7 +207,7 @@ fn centre_mm(head: &HeadModel) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{LinkageSpec, SpringMassSpec, load};
+    use zsim_dynamics::{LinkageSpec, SpringMassSpec, load};
 
     #[test]
     fn a_nod_at_the_rocking_frequency_excites_rocking_about_y_only_as_far_as_damping_allows() {

@@ -3,17 +3,17 @@
 use super::capacity::heaviest_head;
 use super::model::{SpringModel, at_rest};
 use super::{DesignMetrics, MISSION_HOURS, Shake, closed_form, mode_name, simulated};
-use crate::dynamics::{
+use crate::StudyError;
+use crate::coverage::{Coverage, CoveragePlan};
+use crate::gains::{AXES, axis_name};
+use serde::Serialize;
+use zsim_base::geometry::{STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
+use zsim_base::spec::Source;
+use zsim_dynamics::{
     AccelerationKind, ElementLoad, HeadModel, HeadSpec, LinkageSpec, MassLimit, Mode, ModeKind, Peak, stands_with_mass,
 };
-use crate::elasticity::{Coil, EndsSpec, Material, Matrix6, Spring, SpringDesign, SpringSpec, buckling_load_n};
-use crate::geometry::{STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
-use crate::sensors::Lidar;
-use crate::spec::Source;
-use crate::study::StudyError;
-use crate::study::coverage::{Coverage, CoveragePlan};
-use crate::study::gains::{AXES, axis_name};
-use serde::Serialize;
+use zsim_elasticity::{Coil, EndsSpec, Material, Matrix6, Spring, SpringDesign, SpringSpec, buckling_load_n};
+use zsim_sensors::Lidar;
 
 /// Segments for the stiffness of a guided spring, whose ends bend it: near buckling four err by up to 8 %, eight by 6, these by 3.
 const GUIDED_SEGMENTS: usize = 16;
@@ -187,7 +187,7 @@ pub fn spring_report(
 
 /// The report on a head without a stable rest pose.
 fn unstable_report(spec: &HeadSpec, heaviest: Option<MassLimit>, because: String) -> Result<SpringReport, StudyError> {
-    use crate::dynamics::PartSpec::{Block, Body};
+    use zsim_dynamics::PartSpec::{Block, Body};
     let mass = spec.parts.iter().map(|part| match part {
         Block { mass_kg, .. } | Body { mass_kg, .. } => mass_kg,
     });
@@ -198,7 +198,7 @@ fn unstable_report(spec: &HeadSpec, heaviest: Option<MassLimit>, because: String
             let model = SpringModel {
                 wire: super::Wire::of(spring)?,
                 end_m: spring.end_length_m()?,
-                mass_kg: spring.wire_mass_kg().map_err(crate::dynamics::DynamicsError::from)?,
+                mass_kg: spring.wire_mass_kg().map_err(zsim_dynamics::DynamicsError::from)?,
                 ..SpringModel::without_mounting()
             };
             (model, -(base_from_spring.pose().rotation.inverse() * weight).z)
@@ -249,7 +249,7 @@ struct OrderedCoil {
 fn coil_of(spec: &HeadSpec) -> Result<Option<OrderedCoil>, StudyError> {
     let LinkageSpec::Spring { spring, .. } = &spec.linkage else { return Ok(None) };
     let resolved = spring.resolved()?;
-    let design = resolved.design().map_err(crate::dynamics::DynamicsError::from)?;
+    let design = resolved.design().map_err(zsim_dynamics::DynamicsError::from)?;
     Ok(match (design, resolved) {
         (SpringDesign::Coil(coil), SpringSpec::Coil { ends, material, .. }) => {
             Some(OrderedCoil { coil, ends, material })
@@ -322,8 +322,8 @@ fn rows(matrix: &Matrix6) -> [[f64; 6]; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{PartSpec, load};
-    use crate::spec::{Kind, find, parse};
+    use zsim_base::spec::{Kind, find, parse};
+    use zsim_dynamics::{PartSpec, load};
 
     fn utm30lx() -> Lidar {
         let source = find(Kind::Lidar, "utm30lx").unwrap();

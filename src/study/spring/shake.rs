@@ -1,15 +1,15 @@
 //! The shake of a spring.
 
-use crate::dynamics::HeadModel;
 use serde::Deserialize;
 use serde::Serialize;
+use zsim_dynamics::HeadModel;
 
 /// A sinusoidal pitch motion of the base about the foot of the spring, as by a hand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Shake {
     /// Amplitude of the base's pitch, degrees.
-    #[serde(with = "crate::spec::checked::Positive")]
+    #[serde(with = "zsim_base::spec::checked::Positive")]
     pub pitch_deg: f64,
     /// Frequency, Hz; default: that of the slowest mode of the head.
     #[serde(default)]

@@ -2,9 +2,9 @@
 
 use super::mode_figure::ratio;
 use super::{CoilReport, ModeReport, RestReport, SpringReport};
-use crate::dynamics::{ElementKind, ElementLoad};
-use crate::elasticity::VALID_BUCKLING_MARGIN;
-use crate::report::page::PageTable;
+use zsim_dynamics::{ElementKind, ElementLoad};
+use zsim_elasticity::VALID_BUCKLING_MARGIN;
+use zsim_report::page::PageTable;
 
 /// Names of the six directions of a stiffness matrix or a mode shape.
 const DIRECTIONS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];

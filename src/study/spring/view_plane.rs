@@ -1,7 +1,7 @@
 //! View plane of a drawing of a head.
 
-use crate::dynamics::ModeKind;
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
+use zsim_dynamics::ModeKind;
 
 /// A polyline in the view plane, mm; NaN interrupts it.
 pub(super) type Polyline = Vec<(f64, f64)>;

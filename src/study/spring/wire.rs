@@ -1,9 +1,9 @@
 //! Stress in the wire of a helical spring, and the load on it.
 
-use crate::dynamics::{Body, HeadSpec, HeadState, LinkageSpec};
-use crate::elasticity::{Material, SpringSpec};
-use crate::geometry::{Kinematics, Pose, Vector, gravity_in_world};
 use std::f64::consts::{PI, TAU};
+use zsim_base::geometry::{Kinematics, Pose, Vector, gravity_in_world};
+use zsim_dynamics::{Body, HeadSpec, HeadState, LinkageSpec};
+use zsim_elasticity::{Material, SpringSpec};
 
 /// The wire of a coil.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +63,7 @@ impl Wire {
     ///
     /// # Errors
     /// When a named spring does not exist.
-    pub fn of(spec: &SpringSpec) -> Result<Option<Self>, crate::spec::SpecError> {
+    pub fn of(spec: &SpringSpec) -> Result<Option<Self>, zsim_base::spec::SpecError> {
         Ok(match spec.resolved()? {
             SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, material, .. } => {
                 Some(Self { coil_radius_m: 0.5e-3 * coil_diameter_mm, diameter_m: 1e-3 * wire_diameter_mm, material })

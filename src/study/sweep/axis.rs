@@ -4,11 +4,11 @@ use super::design::AxisSize;
 use super::spec::LevelSpec;
 use super::tree::{Assignment, Tree, load_named};
 use super::{AxisSpec, BaseSpec, Sampling, Setting};
-use crate::spec::{Source, SpecError, name_from};
-use crate::study::StudyError;
+use crate::StudyError;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use zsim_base::spec::{Source, SpecError, name_from};
 
 /// An axis whose settings are located in the specs.
 #[derive(Debug, Clone)]

@@ -1,11 +1,11 @@
 //! The run that a sweep varies.
 
-use crate::simulation::Scenario;
-use crate::spec::checked;
-use crate::study::gains::GainsSpec;
-use crate::study::latency::TimingSpec;
-use crate::study::spring::Shake;
+use crate::gains::GainsSpec;
+use crate::latency::TimingSpec;
+use crate::spring::Shake;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
+use zsim_simulation::Scenario;
 
 /// The base run. Each spec is a path or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

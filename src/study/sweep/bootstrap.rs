@@ -1,9 +1,9 @@
 //! Block bootstrap: confidence intervals of the error measures of a run.
 
-use crate::random::Seed;
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
+use zsim_base::random::Seed;
 
 /// Number of bootstrap resamples: the ends of a 95 % interval then rest on 50 resamples each.
 const RESAMPLES: usize = 2000;
@@ -53,7 +53,7 @@ impl Block {
 }
 
 /// Sum of all blocks.
-pub(in crate::study) fn pooled(blocks: &[Block]) -> Block {
+pub(crate) fn pooled(blocks: &[Block]) -> Block {
     blocks.iter().fold(Block::default(), |mut sum, block| {
         sum.add(block, 1.0);
         sum
@@ -76,13 +76,13 @@ pub struct ConfidenceInterval {
 ///
 /// All runs use the same resamples, so that errors common to two runs cancel in their difference.
 #[derive(Debug)]
-pub(in crate::study) struct Resampling {
+pub(crate) struct Resampling {
     /// Multiplicity of each block, per resample.
     counts: Vec<Vec<f64>>,
 }
 
 impl Resampling {
-    pub(in crate::study) fn new(blocks: usize, seed: Seed) -> Self {
+    pub(crate) fn new(blocks: usize, seed: Seed) -> Self {
         let mut stream = seed.stream("latency/bootstrap");
         let mut draw = || {
             let mut counts = vec![0.0; blocks];
@@ -102,7 +102,7 @@ impl Resampling {
     }
 
     /// A measure of all blocks with its confidence interval.
-    pub(in crate::study) fn interval(&self, blocks: &[Block], measure: fn(&Block) -> f64) -> ConfidenceInterval {
+    pub(crate) fn interval(&self, blocks: &[Block], measure: fn(&Block) -> f64) -> ConfidenceInterval {
         percentile_interval(measure(&pooled(blocks)), self.resampled(blocks, measure).collect())
     }
 
@@ -110,11 +110,7 @@ impl Resampling {
     ///
     /// Fits the parabola `a + b x + c x^2` to `curve` (abscissa, blocks); each point has the reciprocal of its bootstrap
     /// variance as weight. `None` if the parabola has no minimum.
-    pub(in crate::study) fn minimum(
-        &self,
-        curve: &[(f64, &[Block])],
-        variance: fn(&Block) -> f64,
-    ) -> Option<ConfidenceInterval> {
+    pub(crate) fn minimum(&self, curve: &[(f64, &[Block])], variance: fn(&Block) -> f64) -> Option<ConfidenceInterval> {
         let resampled: Vec<Vec<f64>> =
             curve.iter().map(|(_, blocks)| self.resampled(blocks, variance).collect()).collect();
         let weights: Vec<f64> = resampled.iter().map(|values| 1.0 / variance_of(values)).collect();

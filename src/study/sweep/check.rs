@@ -2,7 +2,7 @@
 
 use super::design::MAX_SOBOL_AXES;
 use super::{AxisSpec, BaseSpec, Measure, Sampling, SweepSpec};
-use crate::spec::{Source, SpecError};
+use zsim_base::spec::{Source, SpecError};
 
 /// Maximum number of runs of a sweep: limits the plan's memory and the table of runs.
 pub(super) const MAX_RUNS: u64 = 10_000_000;

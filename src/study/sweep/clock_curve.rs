@@ -1,8 +1,8 @@
 //! The clock offset of a run over time.
 
-use crate::evaluation::clock_errors;
-use crate::time::Stamp;
 use serde::{Deserialize, Serialize};
+use zsim_base::time::Stamp;
+use zsim_evaluation::clock_errors;
 
 /// Time between stored points, s.
 const STEP_S: f64 = 1.0;
@@ -10,7 +10,7 @@ const STEP_S: f64 = 1.0;
 /// Estimated clock offset of a run, and its error, at points 1 s apart.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(in crate::study) struct ClockCurve {
+pub(crate) struct ClockCurve {
     /// Time since the first estimate, s.
     pub t_s: Vec<f64>,
     /// Estimated offset, IMU stamp minus lidar stamp of the same time, ms.

@@ -1,10 +1,10 @@
 //! Design of experiment: which combinations of axis values are run.
 
 use super::Sampling;
-use crate::random::Seed;
 use rand::RngExt;
 use sobol::Sobol;
 use sobol::params::JoeKuoD6;
+use zsim_base::random::Seed;
 
 /// Size of an axis: a number of levels, or a continuous range.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,8 +2,8 @@
 
 use super::summary::{LevelSummary, Summary};
 use super::{Measure, Plan};
-use crate::report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, Tick};
-use crate::report::{axis_label, quantity_name};
+use zsim_report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, Tick};
+use zsim_report::{axis_label, quantity_name};
 
 /// Height of a level's row, points: fits a line of text.
 pub(super) const ROW_HEIGHT: f64 = 17.0;

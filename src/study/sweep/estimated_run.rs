@@ -5,18 +5,18 @@ use super::clock_curve::ClockCurve;
 use super::reference_system::{CloudComparison, ReferenceMap};
 use super::run_recording::{Estimates, RunRecording};
 use super::tree::Journey;
-use crate::dynamics::HeadModel;
-use crate::estimation::Status;
-use crate::evaluation::{Errors, Pairs, clock_error_after};
-use crate::geometry::Trajectory;
-use crate::report::{ClockMetrics, IntegrityMetrics, OpenLoopMetrics};
-use crate::simulation::Simulation;
-use crate::study::comparison::{self, Comparison};
-use crate::study::integrity::{Integrity, path_length_m};
-use crate::study::sampled_truth::SampledTruth;
-use crate::study::{ProgressMonitor, StudyError};
+use crate::comparison::{self, Comparison};
+use crate::integrity::{Integrity, path_length_m};
+use crate::sampled_truth::SampledTruth;
+use crate::{ProgressMonitor, StudyError};
 use std::fs::File;
 use std::sync::atomic::AtomicBool;
+use zsim_base::geometry::Trajectory;
+use zsim_dynamics::HeadModel;
+use zsim_estimation::Status;
+use zsim_evaluation::{Errors, Pairs, clock_error_after};
+use zsim_report::{ClockMetrics, IntegrityMetrics, OpenLoopMetrics};
+use zsim_simulation::Simulation;
 
 /// What a run is compared with.
 pub(super) struct RunInputs<'a> {

@@ -12,14 +12,14 @@ use super::identity::ContentHash;
 use super::table::{Column, ColumnType, Table, TableWriter};
 use super::tree::Tree;
 use super::{BaseSpec, Plan, SweepSpec};
-use crate::spec::{self, Source, SpecError, to_text};
-use crate::study::StudyError;
-use crate::study::atomic_file::write_text;
+use crate::StudyError;
+use crate::atomic_file::write_text;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use zsim_base::spec::{self, Source, SpecError, to_text};
 
 /// Rows in a row group of a Parquet table; bounds the memory of a merge.
 pub(super) const ROWS_PER_GROUP: u64 = 16_384;
@@ -94,7 +94,7 @@ impl Plan {
     }
 
     /// The sweep's spec, all specs that it names, and the version of zsim.
-    pub(in crate::study) fn text(&self) -> Result<String, SpecError> {
+    pub(crate) fn text(&self) -> Result<String, SpecError> {
         self.text_with("")
     }
 

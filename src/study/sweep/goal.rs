@@ -1,8 +1,8 @@
 //! Goals and limits of measures, which define a Pareto front.
 
 use super::Measure;
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
 
 /// A goal for a measure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,7 +1,7 @@
 //! Hashes that identify runs by everything that determines their results.
 
 use super::tree::Tree;
-use crate::study::StudyError;
+use crate::StudyError;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// First 128 bits of a SHA-256: collisions are negligible for any feasible number of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::study) struct ContentHash([u8; 16]);
+pub(crate) struct ContentHash([u8; 16]);
 
 impl ContentHash {
     /// Hash of a sequence of byte strings; lengths are hashed too, so that boundaries matter.

@@ -3,12 +3,12 @@
 use super::part::RunOutcome;
 use super::tree::{ClosedForm, GainRun};
 use super::{BaseSpec, Measure, Plan};
-use crate::dynamics::HeadModel;
-use crate::spec;
-use crate::study::StudyError;
-use crate::study::gains::{GainWatch, gain_curve};
-use crate::study::spring::{MISSION_HOURS, closed_form};
+use crate::StudyError;
+use crate::gains::{GainWatch, gain_curve};
+use crate::spring::{MISSION_HOURS, closed_form};
 use std::time::Instant;
+use zsim_base::spec;
+use zsim_dynamics::HeadModel;
 
 /// Evaluates run `index`. A failure, such as a head without static equilibrium, is recorded as an error.
 pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutcome {

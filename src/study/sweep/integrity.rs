@@ -2,9 +2,8 @@
 
 use super::table::ColumnType;
 use super::{Measure, Plan, Sweep};
-use crate::report;
-use crate::study::StudyError;
-use crate::study::integrity::large_error_m;
+use crate::StudyError;
+use crate::integrity::large_error_m;
 
 /// Name of the axis of fault lists, and its level without faults.
 const FAULT_AXIS: (&str, &str) = ("faults", "none");
@@ -167,7 +166,7 @@ impl IntegrityReport {
     pub fn text(&self) -> String {
         let text = |(title, header, rows): (String, Vec<String>, Vec<Vec<String>>)| {
             let header: Vec<&str> = header.iter().map(String::as_str).collect();
-            format!("{title}\n{}\n", report::table(&header, &rows, true))
+            format!("{title}\n{}\n", zsim_report::table(&header, &rows, true))
         };
         self.tables().map(text).concat()
     }
@@ -176,7 +175,7 @@ impl IntegrityReport {
     pub fn markdown(&self) -> String {
         let text = |(title, header, rows): (String, Vec<String>, Vec<Vec<String>>)| {
             let header: Vec<&str> = header.iter().map(String::as_str).collect();
-            format!("\n{title}\n\n{}", report::markdown(&header, &rows))
+            format!("\n{title}\n\n{}", zsim_report::markdown(&header, &rows))
         };
         self.tables().map(text).concat()
     }

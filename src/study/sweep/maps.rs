@@ -3,9 +3,9 @@
 use super::runs::{Runs, level_count, level_label};
 use super::summary::quantile;
 use super::{Measure, Plan, Sweep};
-use crate::report::axis_label;
-use crate::report::plot::{Cell, Cells, Chart, Figure, Tick};
-use crate::study::StudyError;
+use crate::StudyError;
+use zsim_report::axis_label;
+use zsim_report::plot::{Cell, Cells, Chart, Figure, Tick};
 
 /// Maximum number of pairs of axes with a map, to keep the figure readable.
 const MAX_MAPS: usize = 6;

@@ -267,7 +267,7 @@ impl Measure {
     }
 
     /// Label of a plot axis, with the display unit.
-    pub(in crate::study) fn label(self) -> &'static str {
+    pub(crate) fn label(self) -> &'static str {
         self.names().2
     }
 
@@ -346,17 +346,17 @@ impl Measure {
     }
 
     /// Whether a head on its spring has this measure in closed form.
-    pub(in crate::study) fn has_closed_form(self) -> bool {
+    pub(crate) fn has_closed_form(self) -> bool {
         matches!(self.origin(), Origin::ClosedForm | Origin::SwingOrClosedForm)
     }
 
     /// Whether it is a figure of a journey alone: it has no closed form, and needs no second system or timing errors.
-    pub(in crate::study) fn needs_journey(self) -> bool {
+    pub(crate) fn needs_journey(self) -> bool {
         matches!(self.origin(), Origin::Estimate | Origin::AnyMap | Origin::Cloud | Origin::Swing)
     }
 
     /// Whether it is a figure of an estimate.
-    pub(in crate::study) fn is_of_estimate(self) -> bool {
+    pub(crate) fn is_of_estimate(self) -> bool {
         self.origin().is_estimate()
     }
 

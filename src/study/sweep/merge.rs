@@ -4,12 +4,12 @@ use super::folder::{ROWS_PER_GROUP, Unit};
 use super::part::Part;
 use super::table::{Column, ColumnType, Table, TableWriter, quoted};
 use super::{Measure, Shard, Sweep};
-use crate::spec::SpecError;
-use crate::study::StudyError;
-use crate::study::atomic_file::AtomicFile;
+use crate::StudyError;
+use crate::atomic_file::AtomicFile;
 use serde::Serialize;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use zsim_base::spec::SpecError;
 
 /// Progress of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -5,7 +5,6 @@ use super::design::AxisSize;
 use super::summary::{LevelSummary, SIGNIFICANCE_LEVEL, Summary};
 use super::table::quoted;
 use super::{Measure, Plan};
-use crate::report;
 use std::fmt::Write;
 
 /// Axes with more levels are omitted from text and Markdown for readability; `summary.csv` has all levels.
@@ -51,9 +50,9 @@ fn cell(number: f64) -> String {
 pub(super) fn text(summary: &Summary, plan: &Plan) -> String {
     let tables = tables(summary, plan, false).into_iter().map(|(title, header, rows)| {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        format!("{}{}\n", report::wrapped(&title, "  "), report::table(&header, &rows, true))
+        format!("{}{}\n", zsim_report::wrapped(&title, "  "), zsim_report::table(&header, &rows, true))
     });
-    tables.collect::<String>() + &report::wrapped(&legend(summary), "")
+    tables.collect::<String>() + &zsim_report::wrapped(&legend(summary), "")
 }
 
 /// The tables as Markdown, and again at each level of the axis `by`.
@@ -85,7 +84,7 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::SweepStat
     }
     for (title, header, rows) in all {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        text += &format!("\n{title}\n\n{}", report::markdown(&header, &rows));
+        text += &format!("\n{title}\n\n{}", zsim_report::markdown(&header, &rows));
     }
     format!("{text}\n{}\n", legend(summary))
 }
@@ -122,7 +121,7 @@ fn trend_table(summary: &Summary) -> TextTable {
         })
     };
     let row = |axis: &String| {
-        std::iter::once(report::quantity_name(axis))
+        std::iter::once(zsim_report::quantity_name(axis))
             .chain(summary.measures.iter().map(|measure| cell(axis, measure)))
             .collect()
     };
@@ -137,7 +136,7 @@ fn level_table(
     measures: &[Measure],
     bands: bool,
 ) -> TextTable {
-    let mut header = vec![report::quantity_name(axis)];
+    let mut header = vec![zsim_report::quantity_name(axis)];
     for measure in measures {
         header.extend([heading(*measure), "ratio".to_owned()]);
     }
@@ -154,9 +153,11 @@ fn level_table(
         cells
     };
     let rows = summary.of_axis(axis, within_level, *first).map(row).collect();
-    let place = within
-        .map_or_else(|| "over all runs".to_owned(), |(by, level)| format!("{} {level}", report::quantity_name(by)));
-    (format!("By {}, {place}", report::quantity_name(axis)), header, rows)
+    let place = within.map_or_else(
+        || "over all runs".to_owned(),
+        |(by, level)| format!("{} {level}", zsim_report::quantity_name(by)),
+    );
+    (format!("By {}, {place}", zsim_report::quantity_name(axis)), header, rows)
 }
 
 /// Heading of a column: the measure and its unit, if it has one.

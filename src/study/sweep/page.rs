@@ -5,9 +5,9 @@ use super::output::{digits, heading, tables};
 use super::plots::PlotFile;
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
-use crate::report::page::{MAX_PAGE_RUNS, PagePlot, PageTable, PointColumn, RunPoints, StudyPage};
-use crate::report::{axis_label, quantity_name};
-use crate::study::StudyError;
+use crate::StudyError;
+use zsim_report::page::{MAX_PAGE_RUNS, PagePlot, PageTable, PointColumn, RunPoints, StudyPage};
+use zsim_report::{axis_label, quantity_name};
 
 /// Plots above this total size are left to the folder `plots/`, bytes: the page stays below 12 MB.
 const MAX_PLOTS_BYTES: usize = 8_000_000;

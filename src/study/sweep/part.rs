@@ -4,11 +4,11 @@ use super::folder::Unit;
 use super::identity::ContentHash;
 use super::table::{Column, ColumnType, Table, TableWriter};
 use super::{Measure, Sweep};
-use crate::spec::{self, Source};
-use crate::study::StudyError;
+use crate::StudyError;
 use parquet::errors::ParquetError;
 use serde::de::DeserializeOwned;
 use std::error::Error;
+use zsim_base::spec::{self, Source};
 
 /// Metadata keys of a part file: hash of its unit, checksum of its content, and details of its run.
 const UNIT: &str = "zsim.unit";
@@ -138,7 +138,7 @@ impl Sweep {
     ///
     /// # Errors
     /// If a part cannot be opened.
-    pub(in crate::study) fn details<T: DeserializeOwned>(&self) -> Result<Option<Vec<T>>, StudyError> {
+    pub(crate) fn details<T: DeserializeOwned>(&self) -> Result<Option<Vec<T>>, StudyError> {
         let mut all = Vec::new();
         for unit in &self.units {
             let Part::Done { details: Some(details), .. } = self.read_part(unit)? else { return Ok(None) };
@@ -148,7 +148,7 @@ impl Sweep {
     }
 
     /// The error of a study that needs all runs.
-    pub(in crate::study) fn failed(&self) -> StudyError {
+    pub(crate) fn failed(&self) -> StudyError {
         let message = format!("a run failed: see {}", self.folder.join("table.csv").display());
         StudyError::Plan { what: "study", message }
     }

@@ -6,11 +6,11 @@ use super::design::{AxisSize, Design};
 use super::identity::{ContentHash, InputHashes, input_hashes, is_after_recording};
 use super::tree::{GainRun, Journey, Tree};
 use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
-use crate::dynamics::HeadSpec;
-use crate::simulation::{Named, Simulation};
-use crate::spec::{Source, SpecError};
-use crate::study::StudyError;
-use crate::study::gains::GainsSpec;
+use crate::StudyError;
+use crate::gains::GainsSpec;
+use zsim_base::spec::{Named, Source, SpecError};
+use zsim_dynamics::HeadSpec;
+use zsim_simulation::Simulation;
 
 /// A sweep with resolved specs; [`Plan::write`] stores it in a folder.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ impl Plan {
     ///
     /// # Errors
     /// If the spec is invalid.
-    pub(in crate::study) fn of_gains(
+    pub(crate) fn of_gains(
         name: &str,
         spec: &SweepSpec,
         gains: GainsSpec,

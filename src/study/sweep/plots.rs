@@ -5,10 +5,10 @@ use super::pareto::pareto_set;
 use super::runs::Runs;
 use super::summary::{LevelSummary, Summary};
 use super::{Measure, Sweep};
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series, Tick, robust_range};
-use crate::report::quantity_name;
-use crate::study::StudyError;
-use crate::study::atomic_file::write_text;
+use crate::StudyError;
+use crate::atomic_file::write_text;
+use zsim_report::plot::{Chart, Colour, Figure, Mark, Series, Tick, robust_range};
+use zsim_report::quantity_name;
 
 /// Ticks of the logarithmic ratio axis.
 const RATIO_TICKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];

@@ -1,13 +1,12 @@
 //! Inputs of a reference system.
 
 use super::ReferenceSpec;
-use crate::dynamics::HeadSpec;
-use crate::motion::MotionSpec;
-use crate::sensors::LidarSpec;
-use crate::simulation::Named;
-use crate::spec::{Source, name_from};
-use crate::study::StudyError;
+use crate::StudyError;
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::{Named, Source, name_from};
+use zsim_dynamics::HeadSpec;
+use zsim_motion::MotionSpec;
+use zsim_sensors::LidarSpec;
 
 /// Specs of a reference system.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,16 +4,16 @@ use super::Measure;
 use super::reference_inputs::ReferenceInputs;
 use super::run_recording::{Estimates, RunRecording};
 use super::tree::Journey;
-use crate::estimation::{EstimatorSpec, Status};
-use crate::evaluation::{CloudErrors, CloudSummary, Errors, Pairs, ReferenceCloud, align_poses};
-use crate::geometry::{Pose, Surface, Vector};
-use crate::recording::Writer;
-use crate::simulation::{Simulation, carrier_of};
-use crate::study::cloud::Surroundings;
-use crate::study::record::{description, record_together};
-use crate::study::register::ProjectedBeam;
-use crate::study::{ProgressMonitor, StudyError};
+use crate::cloud::Surroundings;
+use crate::record::{description, record_together};
+use crate::register::ProjectedBeam;
+use crate::{ProgressMonitor, StudyError};
 use std::sync::atomic::AtomicBool;
+use zsim_base::geometry::{Pose, Surface, Vector};
+use zsim_estimation::{EstimatorSpec, Status};
+use zsim_evaluation::{CloudErrors, CloudSummary, Errors, Pairs, ReferenceCloud, align_poses};
+use zsim_recording::Writer;
+use zsim_simulation::{Simulation, carrier_of};
 
 /// Maximum number of points of the reference cloud.
 const MAX_REFERENCE_POINTS: usize = 500_000;

@@ -2,12 +2,12 @@
 
 use super::in_process::evaluate;
 use super::{BaseSpec, Measure, Shard, Sweep};
-use crate::simulation::Simulation;
-use crate::spec;
-use crate::study::atomic_file::replace_text;
-use crate::study::result_files::METRICS;
-use crate::study::{EstimateOptions, EstimateResult, ProgressMonitor, StudyError, simulate_and_estimate};
+use crate::atomic_file::replace_text;
+use crate::result_files::METRICS;
+use crate::{EstimateOptions, EstimateResult, ProgressMonitor, StudyError, simulate_and_estimate};
 use std::path::{Path, PathBuf};
+use zsim_base::spec;
+use zsim_simulation::Simulation;
 
 /// Number of digits of a run's hash in the name of its folder.
 const HASH_DIGITS: usize = 8;

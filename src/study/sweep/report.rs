@@ -3,9 +3,9 @@
 use super::integrity::IntegrityReport;
 use super::output::{csv, markdown, text, trends_csv};
 use super::{Summary, Sweep, SweepStatus};
-use crate::study::StudyError;
-use crate::study::atomic_file::write_text;
-use crate::study::latency::LatencyResult;
+use crate::StudyError;
+use crate::atomic_file::write_text;
+use crate::latency::LatencyResult;
 
 /// Report of a merged sweep.
 #[derive(Debug, Clone)]

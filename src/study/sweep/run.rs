@@ -4,8 +4,8 @@ use super::part::RunOutcome;
 use super::runner::Runner;
 use super::worker::{Worker, WorkerExit};
 use super::{BaseSpec, Sweep};
-use crate::study::StudyError;
-use crate::study::progress::PieceProgress;
+use crate::StudyError;
+use crate::progress::PieceProgress;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 

@@ -1,20 +1,20 @@
 //! A recording of a sweep, read by one thread, and the estimates from it.
 
 use super::tree::Journey;
-use crate::estimation::Status;
-use crate::evaluation::Pairs;
-use crate::geometry::Trajectory;
-use crate::measurement::Calibration;
-use crate::recording::{Reader, Selection, TopicPreference};
-use crate::study::calibration::calibration;
-use crate::study::closed_loop::{ClosedLoopRun, run_closed_loop};
-use crate::study::integrity::Integrity;
-use crate::study::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
-use crate::study::sampled_cloud::EstimatedRecording;
-use crate::study::sampled_truth::SampledTruth;
-use crate::study::sensor_models::RecordedSensors;
-use crate::study::{CalibrationSpec, Manifest, ProgressMonitor, StudyError};
+use crate::calibration::calibration;
+use crate::closed_loop::{ClosedLoopRun, run_closed_loop};
+use crate::integrity::Integrity;
+use crate::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
+use crate::sampled_cloud::EstimatedRecording;
+use crate::sampled_truth::SampledTruth;
+use crate::sensor_models::RecordedSensors;
+use crate::{CalibrationSpec, Manifest, ProgressMonitor, StudyError};
 use std::fs::File;
+use zsim_base::geometry::Trajectory;
+use zsim_base::measurement::Calibration;
+use zsim_estimation::Status;
+use zsim_evaluation::Pairs;
+use zsim_recording::{Reader, Selection, TopicPreference};
 
 /// A recording of a journey, read by one thread.
 pub(super) struct RunRecording {

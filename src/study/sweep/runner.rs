@@ -1,6 +1,6 @@
 //! Execution options of a sweep.
 
-use crate::study::progress::OnProgress;
+use crate::progress::OnProgress;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 

@@ -4,7 +4,7 @@ use super::axis::Levels;
 use super::design::AxisPosition;
 use super::table::ColumnType;
 use super::{Measure, Plan, Sweep};
-use crate::study::StudyError;
+use crate::StudyError;
 
 /// Number of bins of a continuous axis in summaries and plots.
 const RANGE_BINS: usize = 12;
@@ -53,7 +53,7 @@ impl Sweep {
     ///
     /// # Errors
     /// If the sweep is not merged.
-    pub(in crate::study) fn values_at(&self, level: &str, measure: Measure) -> Result<Vec<Option<f64>>, StudyError> {
+    pub(crate) fn values_at(&self, level: &str, measure: Measure) -> Result<Vec<Option<f64>>, StudyError> {
         let table = self.open_merged(&self.table())?;
         let Some(axis) = self.plan.axes().first() else { return Ok(Vec::new()) };
         let levels = table.column(&axis.name, ColumnType::Text)?.texts();

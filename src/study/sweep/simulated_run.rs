@@ -8,22 +8,22 @@ use super::reference_inputs::ReferenceInputs;
 use super::reference_system::ReferenceMap;
 use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
-use crate::dynamics::{ContactWatch, HeadState};
-use crate::estimation::EstimatorSpec;
-use crate::evaluation::MapKnowledge;
-use crate::measurement::Calibration;
-use crate::recording::{Reader, Selection, TopicPreference, Writer};
-use crate::simulation::Simulation;
-use crate::spec;
-use crate::study::coverage::{Coverage, CoveragePlan, coverage};
-use crate::study::latency::{MapErrors, Reference, TimingRun, TimingSpec};
-use crate::study::record::{description, record_together};
-use crate::study::{ProgressMonitor, StudyError, information_bound};
+use crate::coverage::{Coverage, CoveragePlan, coverage};
+use crate::latency::{MapErrors, Reference, TimingRun, TimingSpec};
+use crate::record::{description, record_together};
+use crate::{ProgressMonitor, StudyError, information_bound};
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use zsim_base::measurement::Calibration;
+use zsim_base::spec;
+use zsim_dynamics::{ContactWatch, HeadState};
+use zsim_estimation::EstimatorSpec;
+use zsim_evaluation::MapKnowledge;
+use zsim_recording::{Reader, Selection, TopicPreference, Writer};
+use zsim_simulation::Simulation;
 
 /// Maximum number of recordings written at once; bounds memory and temporary disk space.
 pub(super) const MAX_RECORDINGS: usize = 16;
@@ -263,7 +263,7 @@ impl TemporaryRecording {
 ///
 /// # Errors
 /// If the specs do not make a simulation, or if it or the estimate fails or exceeds its time limit.
-pub(in crate::study) fn journey_figures(
+pub(crate) fn journey_figures(
     journey: &Journey,
     measures: &[Measure],
     limit: LimitSpec,

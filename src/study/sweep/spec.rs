@@ -1,9 +1,9 @@
 //! Spec of a sweep: `specs/studies/NAME.ron`.
 
 use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
-use crate::spec::checked;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use zsim_base::spec::checked;
 
 /// A sweep: a base run, the parameters to vary, and the measures to report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -1,11 +1,11 @@
 //! A suite of recordings for other systems: those of the journeys of a plan.
 
 use super::{BaseSpec, Plan, Setting};
-use crate::simulation::Simulation;
-use crate::study::record::record_with_truth_apart;
-use crate::study::{ProgressMonitor, StudyError};
+use crate::record::record_with_truth_apart;
+use crate::{ProgressMonitor, StudyError};
 use std::collections::BTreeSet;
 use std::path::Path;
+use zsim_simulation::Simulation;
 
 /// A recording of a suite.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +78,7 @@ fn plain(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{Source, parse};
+    use zsim_base::spec::{Source, parse};
 
     #[test]
     fn recordings_have_plain_names_and_do_not_depend_on_the_estimator() {

@@ -5,7 +5,7 @@ use super::runs::{Runs, level_count, level_label};
 use super::table::ColumnType;
 use super::trend::rank_correlation;
 use super::{Measure, Plan, Sampling, Sweep};
-use crate::study::StudyError;
+use crate::StudyError;
 use serde::Serialize;
 
 /// Significance level of corrected p-values, for differences between levels and for trends.

@@ -1,7 +1,7 @@
 //! Parquet tables, written atomically.
 
-use crate::study::StudyError;
-use crate::study::atomic_file::AtomicFile;
+use crate::StudyError;
+use crate::atomic_file::AtomicFile;
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
@@ -75,7 +75,7 @@ impl Column {
 }
 
 /// Quotes text for CSV where needed (RFC 4180).
-pub(in crate::study) fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 

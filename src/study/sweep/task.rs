@@ -5,10 +5,10 @@ use super::part::RunOutcome;
 use super::plan::PlannedJourney;
 use super::simulated_run::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
 use super::{LimitSpec, Sweep};
-use crate::simulation::Simulation;
-use crate::study::StudyError;
-use crate::study::threads::for_each_on_threads;
+use crate::StudyError;
+use crate::threads::for_each_on_threads;
 use std::collections::BTreeMap;
+use zsim_simulation::Simulation;
 
 /// Message from a worker to its supervisor, one line on stdout: `begin 7`, `done 7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

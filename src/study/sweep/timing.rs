@@ -2,9 +2,9 @@
 
 use super::bootstrap::pooled;
 use super::{BaseSpec, Journey, Measure, Sweep};
-use crate::study::StudyError;
-use crate::study::atomic_file::write_text;
-use crate::study::latency::{ClockState, LatencyResult, MapErrors, csv, curve_figure, map_figure};
+use crate::StudyError;
+use crate::atomic_file::write_text;
+use crate::latency::{ClockState, LatencyResult, MapErrors, csv, curve_figure, map_figure};
 
 /// A measure of a run with timing errors.
 pub(super) fn figure(errors: &MapErrors, measure: Measure) -> Option<f64> {

@@ -2,25 +2,25 @@
 
 use super::reference_inputs::ReferenceInputs;
 use super::{BaseSpec, ReferenceSpec, settings};
-use crate::dynamics::HeadSpec;
-use crate::estimation::EstimatorSpec;
-use crate::motion::MotionSpec;
-use crate::random::Seed;
-use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use crate::simulation::{FaultsSpec, Named, NamedSpec, Run, Scenario};
-use crate::spec::{Kind, Source, SpecError, name_from};
-use crate::study::StudyError;
-use crate::study::gains::GainsSpec;
-use crate::study::latency::TimingSpec;
-use crate::study::spring::Shake;
-use crate::world::SceneSpec;
+use crate::StudyError;
+use crate::gains::GainsSpec;
+use crate::latency::TimingSpec;
+use crate::spring::Shake;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use zsim_base::random::Seed;
+use zsim_base::spec::{Named, NamedSpec, Source, SpecError, name_from};
+use zsim_dynamics::HeadSpec;
+use zsim_estimation::EstimatorSpec;
+use zsim_motion::MotionSpec;
+use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
+use zsim_simulation::{FaultsSpec, Run, Scenario};
+use zsim_world::SceneSpec;
 
 /// Inputs of a journey: the simulation, the estimator, and timing errors between them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in crate::study) struct Journey {
+pub(crate) struct Journey {
     #[serde(flatten)]
     pub simulation: Run,
     pub estimator: Named<EstimatorSpec>,
@@ -34,7 +34,7 @@ pub(in crate::study) struct Journey {
 
 impl Journey {
     /// A simulation with an estimator, without timing errors.
-    pub(in crate::study) fn new(simulation: Run, estimator: Named<EstimatorSpec>) -> Self {
+    pub(crate) fn new(simulation: Run, estimator: Named<EstimatorSpec>) -> Self {
         Self { simulation, estimator, timing: None, reference: None, ignore_manifest: false }
     }
 }
@@ -51,10 +51,6 @@ pub(super) struct ClosedForm {
 pub(super) struct GainRun {
     pub gains: GainsSpec,
     pub head: Named<HeadSpec>,
-}
-
-impl NamedSpec for EstimatorSpec {
-    const KIND: Kind = Kind::Estimator;
 }
 
 /// The inputs of a run as JSON, without the seed: named specs, and settings without a name.
@@ -237,7 +233,10 @@ fn read<T: DeserializeOwned>(inputs: Map<String, Value>) -> Result<T, String> {
 /// # Errors
 /// If the spec is missing or invalid.
 pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
-    fn load<T: NamedSpec + Serialize>(name: &str) -> Result<Value, StudyError> {
+    fn load<T: NamedSpec + Serialize>(name: &str) -> Result<Value, StudyError>
+    where
+        StudyError: From<T::Error>,
+    {
         Ok(serde_json::to_value(Named::<T>::load(name)?)?)
     }
     match key {
@@ -256,7 +255,7 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::{self, names};
+    use zsim_base::spec::{self, Kind, names};
 
     fn base() -> Tree {
         let source = spec::find(Kind::Study, "integrity").unwrap();

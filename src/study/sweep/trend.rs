@@ -70,7 +70,7 @@ mod tests {
     fn uncorrelated_pairs_are_significant_at_the_nominal_rate() {
         // 5 % of uncorrelated samples have p < 0.05.
         use rand::RngExt;
-        let mut stream = crate::random::Seed(1).stream("test");
+        let mut stream = zsim_base::random::Seed(1).stream("test");
         let mut draw = || -> Vec<(f64, f64)> { (0..30).map(|_| (stream.random(), stream.random())).collect() };
         let significant = (0..4000).filter(|_| rank_correlation(&draw()).unwrap().1 < 0.05).count();
         assert!((140..260).contains(&significant), "{significant} of 4000");

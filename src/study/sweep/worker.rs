@@ -3,8 +3,8 @@
 use super::Sweep;
 use super::runner::Runner;
 use super::task::WorkerMessage;
-use crate::study::StudyError;
-use crate::study::progress::PieceProgress;
+use crate::StudyError;
+use crate::progress::PieceProgress;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};

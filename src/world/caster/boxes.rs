@@ -2,12 +2,12 @@
 
 use super::SingleRay;
 use super::single_precision::{single, single_reach};
-use crate::geometry::Vector;
 use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use zsim_base::geometry::Vector;
 
 /// Boxes whose content is tested by the caller.
-pub(in crate::world) struct BoxTree {
+pub(crate) struct BoxTree {
     /// Subtracted from coordinates so that single precision is sufficient.
     middle: Vector,
     tree: Bvh,

@@ -1,10 +1,10 @@
 //! A flat face: ray intersection and nearest point.
 
 use super::single_precision::{Vec3, single};
-use crate::geometry::Vector;
-use crate::world::MaterialId;
-use crate::world::triangle::Triangle;
+use crate::MaterialId;
+use crate::triangle::Triangle;
 use parry3d::bounding_volume::Aabb;
+use zsim_base::geometry::Vector;
 
 /// Tolerance outside the edges of a face, as a fraction of the edges. Neighbouring faces overlap by this, so that no
 /// ray passes between them.

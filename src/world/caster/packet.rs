@@ -3,9 +3,9 @@
 use super::face::{OVERLAP, SingleFace};
 use super::lanes::{Lanes, cross, dot, load3, splat3};
 use super::single_precision::single_reach;
-use crate::geometry::Vector;
-use crate::world::TimedRay;
+use crate::TimedRay;
 use pulp::Simd;
+use zsim_base::geometry::Vector;
 
 /// Rays of a group.
 pub(super) const PACKET: usize = 16;

@@ -5,10 +5,10 @@ use super::lanes::range;
 use super::packet::{LeafFace, PACKET, Packet};
 use super::wedge::Wedge;
 use super::wide_tree::{Child, WIDTH, WideNode, build};
-use crate::geometry::Vector;
-use crate::world::TimedRay;
+use crate::TimedRay;
 use parry3d::bounding_volume::Aabb;
 use pulp::{Arch, Simd, WithSimd};
+use zsim_base::geometry::Vector;
 
 /// Faces in a tree that groups of rays search.
 pub(super) struct PacketTree {
@@ -129,10 +129,10 @@ fn push_nearest_last(stack: &mut Vec<(f32, Child)>, depths: &[f32; WIDTH], child
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Seed;
-    use crate::world::Ray;
-    use crate::world::caster::face::Face;
+    use crate::Ray;
+    use crate::caster::face::Face;
     use rand::RngExt;
+    use zsim_base::random::Seed;
 
     /// Small triangles at random in a cube of 20 m, and groups of rays from its middle.
     fn cloud() -> (PacketTree, Vec<TimedRay>) {

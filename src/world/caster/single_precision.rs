@@ -1,6 +1,6 @@
 //! Vectors in single precision, as the ray search uses them.
 
-use crate::geometry::Vector;
+use zsim_base::geometry::Vector;
 
 /// A vector in single precision.
 pub(super) type Vec3 = parry3d::math::Vector;

@@ -1,9 +1,9 @@
 //! glTF 2.0, binary (specification of Khronos, sections 3.6 and 4.4).
 
 use super::part::Part;
-use crate::geometry::Vector;
 use serde_json::{Value, json};
 use std::io::{Error, ErrorKind};
+use zsim_base::geometry::Vector;
 
 /// Component type and primitive mode of glTF: 32-bit floats, triangles.
 const FLOAT: u32 = 5126;

@@ -1,7 +1,7 @@
 //! Part of an exported mesh.
 
-use crate::world::Material;
-use crate::world::triangle::Triangle;
+use crate::Material;
+use crate::triangle::Triangle;
 
 /// The triangles of a material.
 pub(super) struct Part<'a> {

@@ -1,7 +1,7 @@
 //! Binary STL.
 
-use crate::geometry::Vector;
 use stl_io::{Normal, Triangle, Vertex};
+use zsim_base::geometry::Vector;
 
 /// Triangles as a binary STL file: corners counterclockwise from outside, m, accurate to single precision.
 ///

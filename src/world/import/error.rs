@@ -5,7 +5,7 @@ pub(super) const MAX_BYTES: u64 = 1 << 30;
 
 /// Why a mesh cannot be used. The name of the file precedes the message.
 #[derive(Debug, thiserror::Error)]
-pub(in crate::world) enum MeshError {
+pub(crate) enum MeshError {
     #[error("cannot be read: {0}")]
     Io(#[from] std::io::Error),
     #[error("has {0} bytes; a mesh has at most {MAX_BYTES}")]

@@ -6,12 +6,12 @@ mod error;
 
 use super::error::{MAX_BYTES, MeshError};
 use super::polygon::triangulate;
-use crate::geometry::Vector;
-use crate::world::triangle::{MAX_TRIANGLES, Triangle};
+use crate::triangle::{MAX_TRIANGLES, Triangle};
 use accessor::{Data, base64};
 use document::{Buffer, Document, Primitive};
 use error::malformed;
 use std::path::{Component, Path};
+use zsim_base::geometry::Vector;
 
 type Transform = nalgebra::Matrix4<f64>;
 

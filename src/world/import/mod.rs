@@ -12,9 +12,9 @@ pub(super) use error::MeshError;
 
 use super::shape::UpAxis;
 use super::triangle::Triangle;
-use crate::geometry::Vector;
 use error::MAX_BYTES;
 use std::path::Path;
+use zsim_base::geometry::Vector;
 
 /// Maximum fraction of triangles without area: a mesh with more is damaged.
 const MAX_FRACTION_WITHOUT_AREA: f64 = 0.1;

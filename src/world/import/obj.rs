@@ -2,8 +2,8 @@
 
 use super::error::MeshError;
 use super::polygon::triangulate;
-use crate::geometry::Vector;
-use crate::world::triangle::Triangle;
+use crate::triangle::Triangle;
+use zsim_base::geometry::Vector;
 
 /// The triangles of an OBJ file; polygons are split into fans.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {

@@ -2,11 +2,11 @@
 
 use super::error::MeshError;
 use super::polygon::triangulate;
-use crate::geometry::Vector;
-use crate::world::triangle::Triangle;
+use crate::triangle::Triangle;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
 use std::io::BufRead;
+use zsim_base::geometry::Vector;
 
 /// The triangles of a PLY file; polygons are split into fans.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {

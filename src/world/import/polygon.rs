@@ -1,8 +1,8 @@
 //! Triangles of polygons.
 
 use super::error::MeshError;
-use crate::geometry::Vector;
-use crate::world::triangle::Triangle;
+use crate::triangle::Triangle;
+use zsim_base::geometry::Vector;
 
 /// Splits polygons into fans of triangles around their first corners; indices start at 0.
 pub(super) fn triangulate(

@@ -1,9 +1,9 @@
 //! STL, binary and ASCII. Both can start with `solid`; the file length distinguishes them.
 
 use super::error::MeshError;
-use crate::geometry::Vector;
-use crate::world::triangle::Triangle;
+use crate::triangle::Triangle;
 use std::io::Cursor;
+use zsim_base::geometry::Vector;
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;

@@ -1,10 +1,10 @@
 use super::divisions::{MAX_DIVISIONS, check_count};
-use crate::geometry::Vector;
-use crate::random::{Seed, Stream};
-use crate::spec::checked;
-use crate::world::triangle::Triangle;
+use crate::triangle::Triangle;
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::Vector;
+use zsim_base::random::{Seed, Stream};
+use zsim_base::spec::checked;
 
 /// Heights of a height field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

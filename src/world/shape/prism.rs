@@ -1,7 +1,7 @@
 //! Boxes, cylinders and stairs: closed surfaces with outward faces.
 
-use crate::geometry::Vector;
-use crate::world::triangle::{Triangle, parallelogram};
+use crate::triangle::{Triangle, parallelogram};
+use zsim_base::geometry::Vector;
 
 /// The box with edges along the axes from `corner`, of size `size`.
 pub(super) fn cuboid(corner: Vector, size: Vector) -> Vec<Triangle> {

@@ -1,7 +1,7 @@
-use crate::geometry::Vector;
-use crate::spec::checked;
-use crate::world::triangle::{Triangle, parallelogram};
+use crate::triangle::{Triangle, parallelogram};
 use serde::{Deserialize, Serialize};
+use zsim_base::geometry::Vector;
+use zsim_base::spec::checked;
 
 /// A doorway or a window: a rectangular opening in a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

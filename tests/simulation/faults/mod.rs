@@ -26,7 +26,8 @@ fn faults(list: &str) -> Source {
 fn simulation(scenario: &Scenario, list: Option<&str>) -> Result<Simulation, String> {
     let mut run = Run::load(scenario).unwrap();
     let wrong = |error: SimulationError| error.to_string();
-    run.faults = list.map(|list| Named::parse(faults(list))).transpose().map_err(wrong)?;
+    run.faults =
+        list.map(|list| Named::parse(faults(list))).transpose().map_err(|error| wrong(SimulationError::from(error)))?;
     Simulation::build(run).map_err(wrong)
 }
 

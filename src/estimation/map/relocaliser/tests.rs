@@ -3,8 +3,7 @@
 use super::super::limits::MAP_LIMITS;
 use super::super::localised_pose::offset_pose;
 use super::*;
-use crate::estimation;
-use crate::geometry::from_roll_pitch_yaw;
+use zsim_base::geometry::from_roll_pitch_yaw;
 
 /// Patches of one resolution of a room of 6 m by 4 m by 2.5 m with a pillar; `at` is the position of the centres within
 /// their cells, 0..1.
@@ -40,7 +39,7 @@ fn all_levels(edge_m: f64, at: f64) -> Vec<Patch> {
 }
 
 fn relocaliser(patches: &[Patch]) -> Relocaliser {
-    let spec = estimation::load("default").unwrap();
+    let spec = crate::load("default").unwrap();
     let map = SurfelMap::new(0.4, 3, patches.iter().map(|patch| patch.to_map_surfel(0.002)).collect()).unwrap();
     let solve = SolveSpec { match_sigma_m: 0.01, covariance_inflation: 7.0, ..spec.solve };
     Relocaliser::new(&map, &spec.matching, &spec.surfels, &solve)

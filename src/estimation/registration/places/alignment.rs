@@ -1,9 +1,9 @@
 //! Point-to-plane registration of two nodes, and the agreement of their surfaces.
 
-use crate::estimation::matching::{Matcher, SearchTrees};
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Matrix, Rotation, Vector};
+use crate::matching::{Matcher, SearchTrees};
+use crate::surfel::Patch;
 use nalgebra::{Matrix4, Vector4};
+use zsim_base::geometry::{Matrix, Rotation, Vector};
 
 /// Number of resolutions used for the registration.
 pub(super) const ALIGNED_LEVELS: usize = 3;
@@ -28,11 +28,11 @@ const MATCH_SIGMA_M: f64 = 0.1;
 ///
 /// Both are relative to their head positions, in map axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::estimation::registration) struct Alignment {
+pub(in crate::registration) struct Alignment {
     /// Heading difference, rad.
-    pub(in crate::estimation::registration) yaw: f64,
+    pub(in crate::registration) yaw: f64,
     /// Translation, m.
-    pub(in crate::estimation::registration) shift: Vector,
+    pub(in crate::registration) shift: Vector,
 }
 
 impl Alignment {

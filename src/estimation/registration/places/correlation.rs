@@ -6,8 +6,8 @@
 
 use super::alignment::Alignment;
 use super::scan_context::is_wall;
-use crate::estimation::surfel::Patch;
-use crate::geometry::{Rotation, Vector};
+use crate::surfel::Patch;
+use zsim_base::geometry::{Rotation, Vector};
 
 /// Edge of the grid cells, m.
 const CELL_M: f64 = 0.5;

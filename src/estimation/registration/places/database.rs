@@ -1,12 +1,12 @@
 //! Divides the recording into nodes, submaps for place recognition.
 
 use super::PlacesSpec;
-use crate::estimation::observed::ObservedSurfels;
-use crate::estimation::registration::corrected_trajectory::CorrectedTrajectory;
-use crate::estimation::registration::submaps::divide;
-use crate::estimation::surfel::Patch;
-use crate::geometry::Vector;
+use crate::observed::ObservedSurfels;
+use crate::registration::corrected_trajectory::CorrectedTrajectory;
+use crate::registration::submaps::divide;
+use crate::surfel::Patch;
 use std::ops::Range;
+use zsim_base::geometry::Vector;
 
 /// Quantile of the surfel heights that defines the height of the ground: a few surfels are lower, on floors below
 /// stairwells or from outliers.

@@ -4,7 +4,7 @@ use super::alignment::{ALIGNED_LEVELS, Alignment, Fit, NodeSurfels, agreement, a
 use super::database::PlaceDatabase;
 use super::scan_context::{self, Context};
 use super::{LoopReport, MATCHING_REACH, PlacesSpec, RelativePose, correlation};
-use crate::estimation::matching::Matcher;
+use crate::matching::Matcher;
 use rayon::prelude::*;
 
 /// Maximum distance of two views of one node, m: up to it the descriptors stay similar.

@@ -29,13 +29,13 @@ pub use spec::PlacesSpec;
 use super::RegistrationSpec;
 use super::corrected_trajectory::CorrectedTrajectory;
 use super::trajectory_difference::largest_difference;
-use crate::estimation::matching::Matcher;
-use crate::estimation::observed::ObservedSurfels;
-use crate::geometry::Trajectory;
-use crate::time::{Span, Stamp};
+use crate::matching::Matcher;
+use crate::observed::ObservedSurfels;
 use database::PlaceDatabase;
 use loop_search::{LoopFilter, LoopSearch};
 use pose_graph::optimise;
+use zsim_base::geometry::Trajectory;
+use zsim_base::time::{Span, Stamp};
 
 /// Open-loop drift that the pose graph assumes, a random walk in m/sqrt(s) and degrees/sqrt(s): large, so that the trajectory
 /// can follow the loops.

@@ -15,12 +15,12 @@
 
 use super::RelativePose;
 use super::alignment::Alignment;
-use crate::estimation::nominal::Correction;
-use crate::estimation::registration::corrected_trajectory::CorrectedTrajectory;
-use crate::estimation::registration::equations::{Equations, PairTerm};
-use crate::estimation::spline::Basis;
-use crate::geometry::{Rotation, Vector, skew};
+use crate::nominal::Correction;
+use crate::registration::corrected_trajectory::CorrectedTrajectory;
+use crate::registration::equations::{Equations, PairTerm};
+use crate::spline::Basis;
 use nalgebra::{Matrix4, Matrix4x6, Vector4};
+use zsim_base::geometry::{Rotation, Vector, skew};
 
 /// Kernel scale of the first step, m: the largest expected drift; each step halves it.
 const FIRST_SCALE_M: f64 = 10.0;
@@ -62,7 +62,7 @@ struct Edge {
 /// Optimises `corrected` with `loops` and `links` between successive nodes; returns the times of the inlier loops.
 ///
 /// `None` if the loops contradict the links or the equations are singular; `corrected` is then invalid.
-pub(in crate::estimation::registration) fn optimise(
+pub(in crate::registration) fn optimise(
     corrected: &mut CorrectedTrajectory,
     loops: &[RelativePose],
     links: &[RelativePose],
@@ -182,11 +182,11 @@ fn norm_m(e: &Vector4<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::load;
-    use crate::estimation::registration::places::with_pose_graph_drift;
-    use crate::geometry::{Pose, Trajectory, from_roll_pitch_yaw};
-    use crate::time::Stamp;
+    use crate::load;
+    use crate::registration::places::with_pose_graph_drift;
     use approx::assert_relative_eq;
+    use zsim_base::geometry::{Pose, Trajectory, from_roll_pitch_yaw};
+    use zsim_base::time::Stamp;
 
     #[test]
     fn derivatives_match_finite_differences() {

@@ -19,10 +19,10 @@ pub struct LoopReport {
 
 /// Measured relative pose of two nodes: a constraint of the pose graph.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::estimation::registration) struct RelativePose {
+pub(in crate::registration) struct RelativePose {
     /// Times of the later and the earlier node, s; the alignment is the pose of the later one in the earlier one.
-    pub(in crate::estimation::registration) times_s: (f64, f64),
-    pub(in crate::estimation::registration) alignment: Alignment,
+    pub(in crate::registration) times_s: (f64, f64),
+    pub(in crate::registration) alignment: Alignment,
     /// Information about `[yaw, shift]`, 1/rad^2 and 1/m^2.
-    pub(in crate::estimation::registration) information: Matrix4<f64>,
+    pub(in crate::registration) information: Matrix4<f64>,
 }

@@ -7,7 +7,7 @@
 //! Only vertical surfaces are used, with heights above the ground, because ceilings look alike everywhere. The vertical axis
 //! is that of gravity, which the open loop observes without drift.
 
-use crate::estimation::surfel::Patch;
+use crate::surfel::Patch;
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 
 /// Number of rings, as in the paper; with `RING_M` the descriptor reaches 20 m.
@@ -130,7 +130,7 @@ pub(super) fn nearest_by_key(contexts: &[Context], count: usize) -> Vec<Vec<usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Matrix, Rotation, Vector};
+    use zsim_base::geometry::{Matrix, Rotation, Vector};
 
     /// Posts at golden angles; `seed` determines heights and distances.
     fn posts(seed: f64, turn: f64) -> Vec<Patch> {

@@ -5,10 +5,10 @@ use super::super::motion::{attitude_jacobian, head_in_world, position_jacobian};
 use super::chain::{CONSTANTS, OWN, columns};
 use super::dense::Information;
 use super::problem::Problem;
-use crate::geometry::{Vector, skew};
-use crate::time::{Span, Stamp};
 use faer::Mat;
 use nalgebra::{Matrix6, SMatrix, Vector6};
+use zsim_base::geometry::{Vector, skew};
+use zsim_base::time::{Span, Stamp};
 
 /// Columns of each kept epoch: position, attitude.
 const OUTPUTS: usize = 6;

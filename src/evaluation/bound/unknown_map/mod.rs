@@ -23,8 +23,7 @@ pub(super) use sightings::Sightings;
 use super::epoch::Epoch;
 use super::model::{BoundModel, EPOCH, InformationBound};
 use super::state::prior;
-use crate::evaluation::EvaluationError;
-use crate::time::Stamp;
+use crate::EvaluationError;
 use chain::{CONSTANTS, HEADING, OWN, POSITION, prior_sigmas, with_minimum_noise};
 use dense::Information;
 use division::{kept_epochs, segments};
@@ -32,6 +31,7 @@ use joint_planes::JointPlanes;
 use problem::Problem;
 use rayon::prelude::*;
 use segment::{Kept, keep};
+use zsim_base::time::Stamp;
 
 /// Maximum length of a run, s. Bounds time and memory.
 const MAX_S: f64 = 300.0;
@@ -106,10 +106,10 @@ mod tests {
     use super::super::epoch::BeamObservation;
     use super::super::smoother;
     use super::*;
-    use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
-    use crate::measurement::ImuSample;
     use approx::assert_relative_eq;
     use nalgebra::Vector3;
+    use zsim_base::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
+    use zsim_base::measurement::ImuSample;
 
     /// Epochs and beams of a head that swings along x in a box of 4 m, with 27 beams at each epoch.
     fn swing(seconds: f64) -> (Vec<Epoch>, Sightings) {

@@ -6,9 +6,9 @@ use super::dense::Information;
 use super::division::Segment;
 use super::problem::Problem;
 use super::sightings::{Sighting, of_plane};
-use crate::geometry::Vector;
 use nalgebra::{Matrix3, Matrix3xX, SMatrix};
 use std::collections::BTreeMap;
+use zsim_base::geometry::Vector;
 
 /// Variables of a segment: other epochs, then kept epochs, constants, joint planes.
 struct Layout<'a> {

@@ -1,9 +1,9 @@
 //! The beams on planes that are unknown.
 
 use super::super::epoch::BeamObservation;
-use crate::geometry::{Rotation, Vector};
 use nalgebra::{Matrix3, Matrix5, SMatrix, Vector5};
 use std::collections::BTreeMap;
+use zsim_base::geometry::{Rotation, Vector};
 
 /// A plane, about a point of it. Its errors are the offset along the normal, m, and the slopes along both axes, rad.
 #[derive(Debug, Clone, Copy)]

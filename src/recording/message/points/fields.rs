@@ -1,7 +1,7 @@
 //! Fields of a point, and the encoding of the time field.
 
 use super::time_unit::TimeUnit;
-use crate::time::{NANOS_PER_SECOND, Span, Stamp};
+use zsim_base::time::{NANOS_PER_SECOND, Span, Stamp};
 
 /// `PointField.UINT32`.
 pub const UINT32: u8 = 6;

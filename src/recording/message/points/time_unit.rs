@@ -1,6 +1,6 @@
 //! Detects the unit of point times if a lidar's clouds contradict the usual one.
 
-use crate::time::{NANOS_PER_SECOND, Stamp};
+use zsim_base::time::{NANOS_PER_SECOND, Stamp};
 
 /// Minimum number of clouds for a decision.
 const MIN_CLOUDS: usize = 5;

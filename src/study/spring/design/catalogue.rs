@@ -1,12 +1,12 @@
 //! Catalogue of available springs, as CSV with the columns that suppliers print.
 
 use super::spec::CoilDesign;
-use crate::elasticity::{EndsSpec, Material};
-use crate::spec::{Source, SpecError, name_from};
 use std::path::Path;
+use zsim_base::spec::{Kind, Source, SpecError, name_from, text_file};
+use zsim_elasticity::{EndsSpec, Material};
 
-/// The built-in catalogue: `specs/springs/catalogue.csv`.
-pub const STOCK: &str = include_str!("../../../../specs/springs/catalogue.csv");
+/// The built-in catalogue, a file of `specs/springs/`.
+const STOCK: &str = "catalogue.csv";
 
 /// The names of the column of each quantity, without a unit; lengths are in mm. A single letter is not another case of itself:
 /// `D` and `d` are the mean and the wire diameter of EN 13906-1.
@@ -33,7 +33,7 @@ const MATERIAL: &[&str] = &["material", "wire_material"];
 /// When the file cannot be read, a column is missing or a line is invalid; the error has the line number.
 pub fn catalogue(name: &str, referring: &Source) -> Result<Vec<CoilDesign>, SpecError> {
     let source = match name {
-        "stock" => Source::in_memory("specs/springs/catalogue.csv (built in)", STOCK),
+        "stock" => text_file(Kind::Spring, &Source::in_memory(STOCK, ""), STOCK)?,
         name => Source::read(Path::new(&name_from(referring, name)))?,
     };
     let lines = source.text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));

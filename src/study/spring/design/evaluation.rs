@@ -2,12 +2,12 @@
 
 use super::limits::Violation;
 use super::spec::{CoilDesign, DesignSpec};
-use crate::dynamics::{HeadSpec, LinkageSpec, stands_with_mass};
-use crate::elasticity::ElasticityError;
-use crate::spec::Source;
-use crate::study::spring::{DesignMetrics, StressCycle, Wire, closed_form};
-use crate::study::sweep::{GoalSpec, Measure};
+use crate::spring::{DesignMetrics, StressCycle, Wire, closed_form};
+use crate::sweep::{GoalSpec, Measure};
 use serde::Serialize;
+use zsim_base::spec::Source;
+use zsim_dynamics::{HeadSpec, LinkageSpec, stands_with_mass};
+use zsim_elasticity::ElasticityError;
 
 /// A feasible design.
 #[derive(Debug, Clone, PartialEq, Serialize)]

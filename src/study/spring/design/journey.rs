@@ -1,14 +1,14 @@
 //! Journeys of a search: what a spring means for coverage, gyroscope and map.
 
 use super::spec::{DesignSpec, JourneySpec};
-use crate::dynamics::HeadSpec;
-use crate::estimation::Status;
-use crate::random::Seed;
-use crate::simulation::{Named, Run, Scenario};
-use crate::spec::{Source, SpecError, name_from};
-use crate::study::StudyError;
-use crate::study::sweep::{Journey, LimitSpec, Measure, journey_figures};
+use crate::StudyError;
+use crate::sweep::{Journey, LimitSpec, Measure, journey_figures};
 use std::collections::BTreeMap;
+use zsim_base::random::Seed;
+use zsim_base::spec::{Named, Source, SpecError, name_from};
+use zsim_dynamics::HeadSpec;
+use zsim_estimation::Status;
+use zsim_simulation::{Run, Scenario};
 
 /// The journeys of the heads of a search, one per seed.
 pub(super) struct Journeys {

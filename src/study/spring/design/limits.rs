@@ -1,9 +1,9 @@
 //! Limits of springs that can be made, do not clash and last.
 
-use crate::elasticity::{SpringDesign, SpringSpec};
-use crate::spec::checked;
-use crate::study::spring::{DesignMetrics, MISSION_HOURS, Wire};
+use crate::spring::{DesignMetrics, MISSION_HOURS, Wire};
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
+use zsim_elasticity::{SpringDesign, SpringSpec};
 
 /// Limits of a spring that can be ordered and lasts; each has a default.
 ///

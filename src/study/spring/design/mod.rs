@@ -21,7 +21,7 @@ mod space;
 mod spec;
 mod verified;
 
-pub use catalogue::{STOCK, catalogue};
+pub use catalogue::catalogue;
 pub use evaluation::Candidate;
 pub use limits::{BuildLimitsSpec, Violation, WireStock};
 pub use output::{csv, pareto_figure, rejected_csv};

@@ -1,9 +1,9 @@
 //! Optimisation of a design: CMA-ES on a scalar cost.
 
 use super::evaluation::Evaluation;
-use crate::random::Stream;
 use cmaes::{CMAESOptions, DVector};
 use rand::RngExt;
+use zsim_base::random::Stream;
 
 /// Runs CMA-ES from `start` in the unit cube; returns all evaluations.
 pub(super) fn optimise(

@@ -5,10 +5,10 @@ use super::journey::Journeys;
 use super::limits::Violation;
 use super::search::DesignSearch;
 use super::verified::{Outcomes, Rejection, VerifiedDesign};
-use crate::study::progress::PieceProgress;
-use crate::study::sweep::{Measure, pareto_set, spread};
-use crate::study::threads::for_each_on_threads;
-use crate::study::{OnProgress, StudyError};
+use crate::progress::PieceProgress;
+use crate::sweep::{Measure, pareto_set, spread};
+use crate::threads::for_each_on_threads;
+use crate::{OnProgress, StudyError};
 use std::sync::{Mutex, PoisonError};
 
 impl DesignSearch {

@@ -3,10 +3,10 @@
 use super::search::DesignStudy;
 use super::spec::CoilDesign;
 use super::verified::VerifiedDesign;
-use crate::report::plot::{Chart, Colour, Figure, Mark, Series};
-use crate::study::spring::DesignMetrics;
-use crate::study::sweep::{Measure, quoted};
+use crate::spring::DesignMetrics;
+use crate::sweep::{Measure, quoted};
 use std::fmt::Write;
+use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// Columns of the metrics.
 const METRICS: [Measure; 7] = [

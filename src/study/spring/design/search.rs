@@ -7,19 +7,19 @@ use super::optimise::{Scales, optimise, weights};
 use super::space::Space;
 use super::spec::{CoilDesign, DesignSpec};
 use super::verified::{Outcomes, Rejection, VerifiedDesign};
-use crate::dynamics::{HeadSpec, LinkageSpec};
-use crate::random::Seed;
-use crate::sensors::Lidar;
-use crate::spec::{Kind, Source, SpecError, find_from, parse};
-use crate::study::coverage::CoveragePlan;
-use crate::study::progress::PieceProgress;
-use crate::study::spring::{Wire, simulated};
-use crate::study::sweep::{Measure, pareto_set, spread};
-use crate::study::{OnProgress, StudyError};
+use crate::coverage::CoveragePlan;
+use crate::progress::PieceProgress;
+use crate::spring::{Wire, simulated};
+use crate::sweep::{Measure, pareto_set, spread};
+use crate::{OnProgress, StudyError};
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use zsim_base::random::Seed;
+use zsim_base::spec::{Kind, Source, SpecError, find_from, parse};
+use zsim_dynamics::{HeadSpec, LinkageSpec};
+use zsim_sensors::Lidar;
 
 /// Result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]

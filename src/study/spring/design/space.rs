@@ -2,9 +2,9 @@
 
 use super::catalogue::catalogue;
 use super::spec::{CoilDesign, DesignSpec, SpaceSpec};
-use crate::elasticity::{EndsSpec, Material};
-use crate::spec::{Source, SpecError};
-use crate::study::sweep::Measure;
+use crate::sweep::Measure;
+use zsim_base::spec::{Source, SpecError};
+use zsim_elasticity::{EndsSpec, Material};
 
 /// A validated design space.
 pub(super) enum Space {

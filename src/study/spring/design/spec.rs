@@ -2,10 +2,10 @@
 
 use super::super::Shake;
 use super::limits::BuildLimitsSpec;
-use crate::elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
-use crate::spec::checked;
-use crate::study::sweep::{GoalSpec, MeasureLimitSpec};
+use crate::sweep::{GoalSpec, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
+use zsim_base::spec::checked;
+use zsim_elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
 
 /// A search for a spring: design space, goals and limits.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]

@@ -2,8 +2,8 @@
 
 use super::evaluation::Candidate;
 use super::spec::CoilDesign;
-use crate::study::spring::DesignMetrics;
-use crate::study::sweep::Measure;
+use crate::spring::DesignMetrics;
+use crate::sweep::Measure;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

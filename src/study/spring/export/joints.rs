@@ -1,8 +1,8 @@
 //! The springs of a head as six joints in series.
 
-use crate::dynamics::{Body, LinearModel};
-use crate::elasticity::{Matrix6, Vector6, blocks, split, stack};
-use crate::geometry::{Matrix, STANDARD_GRAVITY_M_PER_S2, Vector, skew};
+use zsim_base::geometry::{Matrix, STANDARD_GRAVITY_M_PER_S2, Vector, skew};
+use zsim_dynamics::{Body, LinearModel};
+use zsim_elasticity::{Matrix6, Vector6, blocks, split, stack};
 
 /// An elastic joint; forces and stiffness in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,9 @@
 //! The wire of the springs of a head at rest as a triangle mesh.
 
-use crate::geometry::{Pose, Vector};
-use crate::study::spring::outline::SpringOutline;
+use crate::spring::outline::SpringOutline;
 use nalgebra::Point3;
 use std::f64::consts::TAU;
+use zsim_base::geometry::{Pose, Vector};
 
 /// Sections of the wire per coil, and corners of a section: the faces are within 1 % of the radii of coil and wire.
 const SECTIONS_PER_COIL: usize = 36;
@@ -73,11 +73,11 @@ fn ring(middle: &Vector, along: &Vector, foot: &Pose, wire_radius_m: f64) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::{HeadModel, load};
-    use crate::study::spring::{HeadExport, outline::Link};
+    use crate::spring::{HeadExport, outline::Link};
     use approx::assert_relative_eq;
     use std::collections::BTreeMap;
     use std::f64::consts::PI;
+    use zsim_dynamics::{HeadModel, load};
 
     /// The only spring of the handheld head, and the pose of the head at rest.
     fn handheld() -> (SpringOutline, Pose) {

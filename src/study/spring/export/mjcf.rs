@@ -2,8 +2,8 @@
 
 use super::joints::ElasticJoint;
 use super::{HeadExport, list};
-use crate::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 use std::fmt::Write as _;
+use zsim_base::geometry::{Pose, STANDARD_GRAVITY_M_PER_S2, Vector};
 
 impl HeadExport {
     /// MJCF: a static body `base` with the body `head`, and sites for the sensors.

@@ -10,10 +10,10 @@ mod sdf;
 mod urdf;
 
 use super::outline::{Link, SpringOutline};
-use crate::dynamics::{Body, CarrierSpec, HeadModel, HeadSpec, LinearModel, PartSpec, natural_frequencies_hz};
-use crate::geometry::{Pose, Vector};
-use crate::world::stl;
 use joints::{ElasticJoint, RestModel};
+use zsim_base::geometry::{Pose, Vector};
+use zsim_dynamics::{Body, CarrierSpec, HeadModel, HeadSpec, LinearModel, PartSpec, natural_frequencies_hz};
+use zsim_world::stl;
 
 /// Greatest relative error of the model's natural frequencies.
 const MAX_FREQUENCY_ERROR: f64 = 0.01;
@@ -118,6 +118,6 @@ fn list(numbers: &[f64]) -> String {
 
 /// Position, then roll, pitch and yaw, m and rad.
 fn position_and_angles(pose: &Pose) -> (Vector, [f64; 3]) {
-    let (roll, pitch, yaw) = crate::geometry::roll_pitch_yaw(&pose.rotation);
+    let (roll, pitch, yaw) = zsim_base::geometry::roll_pitch_yaw(&pose.rotation);
     (pose.translation.vector, [roll, pitch, yaw])
 }

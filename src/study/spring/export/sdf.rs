@@ -2,8 +2,8 @@
 
 use super::joints::ElasticJoint;
 use super::{HeadExport, LINK_INERTIA_KG_M2, LINK_MASS_KG, list, position_and_angles};
-use crate::geometry::{Matrix, Pose, Vector};
 use std::fmt::Write as _;
+use zsim_base::geometry::{Matrix, Pose, Vector};
 
 impl HeadExport {
     /// SDF 1.9: a model with the frame `base` as its origin.

@@ -2,8 +2,8 @@
 
 use super::joints::ElasticJoint;
 use super::{HeadExport, LINK_INERTIA_KG_M2, LINK_MASS_KG, list, position_and_angles};
-use crate::geometry::{Pose, Vector};
 use std::fmt::Write as _;
+use zsim_base::geometry::{Pose, Vector};
 
 impl HeadExport {
     /// URDF with the frames of recordings: `base`, `head`, `laser`, `imu_link`.

@@ -2,8 +2,8 @@
 
 use super::document::{Accessor, Document};
 use super::error::malformed;
-use crate::geometry::Vector;
-use crate::world::import::error::MeshError;
+use crate::import::error::MeshError;
+use zsim_base::geometry::Vector;
 
 /// Values of `componentType` in the specification.
 const U8: u32 = 5121;

@@ -1,8 +1,8 @@
 //! The geometry part of a glTF document (glTF 2.0 specification, section 5). Indices are validated where they are used.
 
-use crate::geometry::Vector;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use zsim_base::geometry::Vector;
 
 type Transform = nalgebra::Matrix4<f64>;
 
@@ -115,7 +115,7 @@ impl Node {
         }
         let translation = Vector::from(self.translation.unwrap_or_default());
         let [x, y, z, w] = self.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
-        let rotation = crate::geometry::Rotation::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+        let rotation = zsim_base::geometry::Rotation::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
         let scale = Vector::from(self.scale.unwrap_or([1.0; 3]));
         Transform::new_translation(&translation) * rotation.to_homogeneous() * Transform::new_nonuniform_scaling(&scale)
     }

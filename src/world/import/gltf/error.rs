@@ -1,6 +1,6 @@
 //! Errors of glTF files.
 
-use crate::world::import::error::MeshError;
+use crate::import::error::MeshError;
 
 /// An error in the content of a glTF file.
 pub(super) fn malformed(problem: impl Into<String>) -> MeshError {

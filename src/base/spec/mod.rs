@@ -9,12 +9,14 @@ mod bounds;
 pub mod checked;
 mod error;
 mod library;
+mod named;
 mod ron_text;
 mod source;
 mod unit;
 
 pub use error::SpecError;
 pub use library::{Kind, MAX_SPEC_BYTES, find, find_from, name_from, names, text_file};
+pub use named::{Named, NamedSpec};
 pub use source::Source;
 pub use unit::split_unit;
 

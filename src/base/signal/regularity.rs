@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn the_arrivals_of_a_micro_controller_have_no_period() {
         // Arrival times of a real sensor, as samples of a 100 Hz IMU; any second and a half of them.
-        let text = include_str!("../../specs/faults/imu_arrivals_mcu.txt");
+        let text = include_str!("../../../specs/faults/imu_arrivals_mcu.txt");
         let arrivals = text.lines().filter(|line| !line.starts_with('#')).map(|line| line.parse::<f64>().unwrap());
         let mut samples: Vec<f64> = arrivals.map(|arrival| (arrival / 0.01).ceil() * 0.01).collect();
         samples.dedup();
@@ -322,7 +322,7 @@ mod tests {
     /// that sleep for a period and then work.
     #[test]
     fn stamps_that_walk_have_no_period() {
-        let text = include_str!("../../specs/faults/imu_arrivals_mcu.txt");
+        let text = include_str!("../../../specs/faults/imu_arrivals_mcu.txt");
         let arrivals: Vec<f64> =
             text.lines().filter(|line| !line.starts_with('#')).map(|line| line.parse().unwrap()).collect();
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);

@@ -5,8 +5,8 @@
 //! triangles. [`World::cast`] returns the first surface on a ray: distance, normal and material.
 //!
 //! ```
-//! use zsim::geometry::Vector;
-//! use zsim::world::{Ray, World};
+//! use zsim_base::geometry::Vector;
+//! use crate::{Ray, World};
 //!
 //! let office = World::load("office")?;
 //! let route = office.default_route().ok_or("no route")?;

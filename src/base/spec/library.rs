@@ -1,14 +1,13 @@
 //! Search for specs: as a path, in `scenes/` and `specs/` of the working directory, in the binary.
 
 use super::{Source, SpecError};
-use include_dir::{Dir, include_dir};
+use include_dir::Dir;
 use std::path::{Path, PathBuf};
+use zsim_scenes::SCENES;
+use zsim_specs::SPECS;
 
 /// Maximum size of a spec, bytes. A larger file is not a spec.
 pub const MAX_SPEC_BYTES: u64 = 16 << 20;
-
-static SCENES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenes");
-static SPECS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/specs");
 
 impl Source {
     /// Reads the file of a spec.

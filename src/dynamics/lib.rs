@@ -3,7 +3,7 @@
 //! A [`HeadSpec`] describes the parts of a head and the linkage to the base: rigid, actuated, one spring, or several
 //! springs, cords, floats and a joint. A [`HeadModel`] is the validated head in equilibrium with its modes. A
 //! [`HeadSimulation`] computes the motion of the head on a moving base. The forces of a linkage are the sum over its
-//! elements. Spring mechanics are in [`crate::elasticity`]; rapier integrates the rigid body (see `engine`), and no
+//! elements. Spring mechanics are in [`zsim_elasticity`]; rapier integrates the rigid body (see `engine`), and no
 //! other module uses rapier.
 
 mod actuated;

@@ -9,7 +9,7 @@ mod error;
 mod faults;
 mod measure;
 mod motion;
-mod named;
+
 mod prepared;
 mod rig;
 mod run;
@@ -20,9 +20,10 @@ mod summary;
 pub use error::SimulationError;
 pub use faults::{FaultKind, FaultSpec, Faults, FaultsSpec, FaultySensor, MissEncoding};
 pub use motion::{HeadMotion, STEP_S};
-pub use named::{Named, NamedSpec};
+
 pub use prepared::{Simulation, carrier_of};
 pub use rig::{EPOCH, Outputs, Rig};
 pub use run::simulate;
 pub use scenario::{Run, Scenario};
 pub use summary::SimulationSummary;
+pub use zsim_base::spec::{Named, NamedSpec};

@@ -2,9 +2,9 @@
 //!
 //! The module is separate so that the architecture can forbid estimation to depend on it.
 
-use crate::geometry::Kinematics;
-use crate::measurement::SinkError;
-use crate::time::{Span, Stamp};
+use zsim_base::geometry::Kinematics;
+use zsim_base::measurement::SinkError;
+use zsim_base::time::{Span, Stamp};
 
 /// True motion of the head and its base at one time, both in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

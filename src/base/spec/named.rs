@@ -1,9 +1,6 @@
-use super::{FaultsSpec, SimulationError};
-use crate::dynamics::{HeadSpec, LinkageSpec};
-use crate::motion::MotionSpec;
-use crate::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use crate::spec::{Kind, Source, find, parse};
-use crate::world::SceneSpec;
+//! Specs that a run refers to by name.
+
+use super::{Kind, Source, SpecError, find, parse};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -13,11 +10,14 @@ pub trait NamedSpec: DeserializeOwned {
     /// Kind of the spec; it determines the folder in the library.
     const KIND: Kind;
 
+    /// Why a spec, or a file that it includes, is invalid.
+    type Error: From<SpecError>;
+
     /// The spec with the content of the files that it includes.
     ///
     /// # Errors
     /// If a file is missing or invalid.
-    fn resolved(self, _source: &Source) -> Result<Self, SimulationError> {
+    fn resolved(self, _source: &Source) -> Result<Self, Self::Error> {
         Ok(self)
     }
 }
@@ -48,7 +48,7 @@ impl<T: NamedSpec> Named<T> {
     ///
     /// # Errors
     /// If the spec, or a file that it includes, is missing or invalid.
-    pub fn load(name: &str) -> Result<Self, SimulationError> {
+    pub fn load(name: &str) -> Result<Self, T::Error> {
         Ok(Self { name: name.to_owned(), ..Self::parse(find(T::KIND, name)?)? })
     }
 
@@ -56,7 +56,7 @@ impl<T: NamedSpec> Named<T> {
     ///
     /// # Errors
     /// As [`Named::load`].
-    pub fn parse(source: Source) -> Result<Self, SimulationError> {
+    pub fn parse(source: Source) -> Result<Self, T::Error> {
         let spec = parse::<T>(&source)?.resolved(&source)?;
         let folder = source.folder.as_ref().map(|folder| folder.canonicalize().unwrap_or_else(|_| folder.clone()));
         Ok(Self { name: source.name.clone(), folder, spec, source: Some(source) })
@@ -73,50 +73,5 @@ impl<T> Named<T> {
     pub fn source(&self) -> Source {
         let stored = || Source { name: self.name.clone(), folder: self.folder.clone(), text: String::new() };
         self.source.clone().unwrap_or_else(stored)
-    }
-}
-
-impl NamedSpec for SceneSpec {
-    const KIND: Kind = Kind::Scene;
-
-    fn resolved(self, source: &Source) -> Result<Self, SimulationError> {
-        Ok(self.with_includes(source)?)
-    }
-}
-
-impl NamedSpec for HeadSpec {
-    const KIND: Kind = Kind::Head;
-
-    /// A spring that is given by name is replaced by its description, so that its settings can be varied.
-    fn resolved(self, source: &Source) -> Result<Self, SimulationError> {
-        let mut head = self.with_files_of(source);
-        if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
-            *spring = spring.resolved()?;
-        }
-        Ok(head)
-    }
-}
-
-impl NamedSpec for MotionSpec {
-    const KIND: Kind = Kind::Motion;
-}
-
-impl NamedSpec for LidarSpec {
-    const KIND: Kind = Kind::Lidar;
-}
-
-impl NamedSpec for ImuSpec {
-    const KIND: Kind = Kind::Imu;
-}
-
-impl NamedSpec for ClocksSpec {
-    const KIND: Kind = Kind::Clock;
-}
-
-impl NamedSpec for FaultsSpec {
-    const KIND: Kind = Kind::Faults;
-
-    fn resolved(self, source: &Source) -> Result<Self, SimulationError> {
-        Ok(self.with_files(source)?)
     }
 }
