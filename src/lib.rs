@@ -54,13 +54,16 @@
 //!
 //! # Modules
 //!
-//! - Basics: [time], [random], [geometry], [signal], [spec], [elasticity], [surfel_map], [measurement], [truth].
+//! Each module is a crate of its own, `zsim-estimation` for [estimation]; this crate names them together.
+//!
+//! - Basics, from `zsim-base`: [time], [random], [geometry], [signal], [spec], [surfel_map], [measurement]. Also [truth]
+//!   and [elasticity].
 //! - Input and output: [recording].
 //! - Simulation: [world], [motion], [dynamics], [sensors], [simulation].
 //! - Estimation: [estimation], [evaluation].
 //! - Applications: [report] and [study], with the feature `studies` (on by default).
 //!
-//! Simulation and estimation do not depend on each other; the test `tests/architecture.rs` enforces this.
+//! Simulation and estimation do not depend on each other: the manifest of a crate lists those that it may use.
 
 pub use zsim_base::{geometry, measurement, random, signal, spec, surfel_map, time};
 pub use zsim_dynamics as dynamics;

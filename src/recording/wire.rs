@@ -56,10 +56,9 @@ mod tests {
                 numbers: numbers.to_vec(),
                 end: 3,
             };
-            let other = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&mixed).unwrap();
-            assert_eq!(written(frame, numbers)[4..], other, "{frame}");
-            let big = cdr_encoding::to_vec::<_, byteorder::BigEndian>(&mixed).unwrap();
-            let big = [&[0, 0, 0, 0], big.as_slice()].concat();
+            let other = cdr::serialize::<_, _, cdr::CdrLe>(&mixed, cdr::Infinite).unwrap();
+            assert_eq!(written(frame, numbers), other, "{frame}");
+            let big = cdr::serialize::<_, _, cdr::CdrBe>(&mixed, cdr::Infinite).unwrap();
             let mut input = Decoder::new(Payload::cdr(&big)).unwrap();
             assert_eq!(input.header().unwrap(), (Stamp::from_nanos(-1), frame));
             assert_eq!(input.u8().unwrap(), 9);

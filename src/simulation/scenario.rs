@@ -2,7 +2,7 @@ use super::{FaultsSpec, SimulationError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Named, checked};
+use zsim_base::spec::{Named, checked, to_json};
 use zsim_dynamics::HeadSpec;
 use zsim_motion::MotionSpec;
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
@@ -116,12 +116,12 @@ impl Run {
     /// # Errors
     /// If a number is not finite.
     pub fn ray_inputs(&self) -> Result<Value, serde_json::Error> {
-        let mut lidar = serde_json::to_value(&self.lidar.spec)?;
+        let mut lidar = to_json(&self.lidar.spec)?;
         if let Some(lidar) = lidar.as_object_mut() {
             lidar.retain(|key, _| !["errors", "noise"].contains(&key.as_str()));
         }
         let specs = (&self.scene.spec, &self.head.spec, &self.motion.spec, &self.clock.spec);
-        serde_json::to_value((specs, lidar, &self.route, self.duration_s, self.seed))
+        to_json(&(specs, lidar, &self.route, self.duration_s, self.seed))
     }
 
     /// The run without the folders of its specs, which differ between machines.

@@ -2,9 +2,7 @@
 
 use super::Manifest;
 use super::sensor_models::RecordedSensors;
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
-use zsim_base::spec::{self, Named, NamedSpec, SpecError};
+use zsim_base::spec::{Named, NamedSpec, SpecError, Subtree, Tree};
 use zsim_recording::Reader;
 use zsim_sensors::{ImuSpec, LidarSpec};
 
@@ -25,27 +23,6 @@ struct PartialSensors {
     lidar: Option<LidarSpec>,
 }
 
-/// The parts of a manifest that are read one by one; other keys are ignored.
-#[derive(Deserialize)]
-struct LooseManifest {
-    #[serde(default)]
-    version: Option<String>,
-    #[serde(default)]
-    run: Option<LooseSensors>,
-    /// The key of `run` in manifests before 0.1.0.
-    #[serde(default)]
-    specs: Option<LooseSensors>,
-}
-
-/// Texts of the sensors.
-#[derive(Deserialize)]
-struct LooseSensors {
-    #[serde(default)]
-    imu: Option<Box<ron::value::RawValue>>,
-    #[serde(default)]
-    lidar: Option<Box<ron::value::RawValue>>,
-}
-
 impl RecordedManifest {
     /// Reads the manifest in the recording of `reader`.
     pub(super) fn read(reader: &Reader) -> Self {
@@ -58,10 +35,13 @@ impl RecordedManifest {
 
     /// Reads the sensors of a manifest that cannot be read completely because of `error`.
     fn read_partially(text: &str, error: &SpecError) -> Self {
-        let loose = parsed::<LooseManifest>(text);
-        let version = loose.as_ref().and_then(|loose| loose.version.clone());
-        let run = loose.and_then(|loose| loose.run.or(loose.specs));
-        let (imu, lidar) = run.map_or((None, None), |run| (sensor(run.imu), sensor(run.lidar)));
+        let tree = Tree::read(&Manifest::source(text)).ok();
+        let part = |path: &[&str]| tree.as_ref()?.get(path);
+        let version = part(&["version"]).and_then(|version| version.to::<Option<String>>().ok()?);
+        // The key of `run` is `specs` in manifests before 0.1.0.
+        let run = part(&["run"]).or_else(|| part(&["specs"]));
+        let imu = run.and_then(|run| sensor(run.get(&["imu"])?));
+        let lidar = run.and_then(|run| sensor(run.get(&["lidar"])?));
         let read = match (&imu, &lidar) {
             (Some(_), Some(_)) => "the models of IMU and lidar are from it",
             (Some(_), None) => "the model of the IMU is from it, that of the lidar is not",
@@ -88,13 +68,8 @@ impl RecordedManifest {
     }
 }
 
-/// The value of `text`, if this version can read it.
-fn parsed<T: DeserializeOwned>(text: &str) -> Option<T> {
-    spec::parse(&Manifest::source(text)).ok()
-}
-
-/// A sensor with or without its name.
-fn sensor<T: NamedSpec>(text: Option<Box<ron::value::RawValue>>) -> Option<T> {
-    let text = text?;
-    parsed::<Named<T>>(text.get_ron()).map(|named| named.spec).or_else(|| parsed::<T>(text.get_ron()))
+/// A sensor with or without its name, if this version can read it.
+fn sensor<T: NamedSpec>(part: Subtree<'_>) -> Option<T> {
+    let named = part.to::<Option<Named<T>>>().map(|named| named.map(|named| named.spec));
+    named.or_else(|_| part.to::<Option<T>>()).ok()?
 }

@@ -1,40 +1,40 @@
-use super::Source;
+use super::{Position, Source};
 use std::fmt;
 
 /// An error in a spec: file, position, message, and remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
     file: String,
-    position: Option<Position>,
+    place: Option<Place>,
     message: String,
     help: Option<String>,
 }
 
+/// A position, and the line of the text that contains it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Position {
-    line: usize,
-    column: usize,
+struct Place {
+    position: Position,
     text: String,
 }
 
 impl SpecError {
     /// An error about a file as a whole.
     pub fn plain(file: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { file: file.into(), position: None, message: message.into(), help: None }
+        Self { file: file.into(), place: None, message: message.into(), help: None }
     }
 
     /// An error at a position in the text of a spec.
-    pub fn at(source: &Source, position: ron::error::Position, message: impl Into<String>) -> Self {
+    pub fn at(source: &Source, position: Position, message: impl Into<String>) -> Self {
         let text = source.text.lines().nth(position.line.saturating_sub(1)).unwrap_or_default().to_owned();
-        let position = Position { line: position.line, column: position.col, text };
-        Self { file: source.name.clone(), position: Some(position), message: message.into(), help: None }
+        let place = Place { position, text };
+        Self { file: source.name.clone(), place: Some(place), message: message.into(), help: None }
     }
 
     /// An error at the first occurrence of `key` in the text of a spec, for inconsistencies between several fields.
     pub fn about(source: &Source, key: &str, message: impl Into<String>) -> Self {
         let found = source.text.lines().enumerate().find_map(|(index, line)| Some((index, word_in(line, key)?)));
         match found {
-            Some((line, col)) => Self::at(source, ron::error::Position { line: line + 1, col: col + 1 }, message),
+            Some((line, column)) => Self::at(source, Position { line: line + 1, column: column + 1 }, message),
             None => Self::plain(source.name.clone(), message),
         }
     }
@@ -43,10 +43,8 @@ impl SpecError {
     /// For keys that occur in several similar parts.
     pub fn about_after(source: &Source, anchor: &str, words: &str, message: impl Into<String>) -> Self {
         let Some(start) = source.text.find(anchor) else { return Self::plain(source.name.clone(), message) };
-        let position = source.text[start..].find(words).map_or(start, |after| start + after);
-        let before = &source.text[..position];
-        let col = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-        Self::at(source, ron::error::Position { line: before.matches('\n').count() + 1, col }, message)
+        let offset = source.text[start..].find(words).map_or(start, |after| start + after);
+        Self::at(source, Position::of_offset(&source.text, offset), message)
     }
 
     /// Adds a remedy to the error.
@@ -58,7 +56,7 @@ impl SpecError {
 
     /// Line and column, from 1, if known.
     pub fn line_and_column(&self) -> Option<(usize, usize)> {
-        self.position.as_ref().map(|position| (position.line, position.column))
+        self.place.as_ref().map(|place| (place.position.line, place.position.column))
     }
 
     /// The message without the position.
@@ -80,9 +78,9 @@ fn word_in(line: &str, key: &str) -> Option<usize> {
 
 impl fmt::Display for SpecError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.position {
+        match &self.place {
             None => write!(f, "{}: {}", self.file, self.message)?,
-            Some(Position { line, column, text }) => {
+            Some(Place { position: Position { line, column }, text }) => {
                 let margin = line.to_string();
                 // Of a long line (a mesh in one row) only the part near the position is shown.
                 let start = column.saturating_sub(60);

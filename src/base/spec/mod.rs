@@ -1,24 +1,28 @@
 //! Specs: reading and writing RON files.
 //!
 //! A spec is a struct that derives `Deserialize` with `#[serde(deny_unknown_fields)]`. Each key contains the unit, and
-//! each number is checked (see [`checked`]). [`parse`] converts text to the struct. Any error (syntax, unknown key,
-//! number out of range) is a [`SpecError`] with file, line and column. Relations between fields are checked when the
-//! model is built from the spec.
+//! each number is checked (see [`checked`]). [`parse`] converts text to the struct: the text becomes a [`Tree`], and the
+//! struct is read from the tree. Any error (syntax, unknown key, number out of range) is a [`SpecError`] with file, line
+//! and column. Relations between fields are checked when the model is built from the spec.
 
-mod bounds;
 pub mod checked;
 mod error;
 mod library;
 mod named;
-mod ron_text;
+mod position;
 mod source;
+mod tree;
 mod unit;
+mod writer;
 
 pub use error::SpecError;
 pub use library::{Kind, MAX_SPEC_BYTES, find, find_from, name_from, names, text_file};
 pub use named::{Named, NamedSpec};
+pub use position::Position;
 pub use source::Source;
+pub use tree::{Subtree, Tree};
 pub use unit::split_unit;
+pub use writer::to_json;
 
 use serde::de::DeserializeOwned;
 
@@ -27,13 +31,7 @@ use serde::de::DeserializeOwned;
 /// # Errors
 /// A [`SpecError`] with line and column for invalid syntax, unknown or missing keys, and numbers out of range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
-    ron_text::from_text(&source.text).map_err(|error| {
-        let bounds = match error.code {
-            ron::Error::IntegerOutOfBounds => bounds::message::<T>(source, &error),
-            _ => None,
-        };
-        SpecError::at(source, error.span.start, bounds.unwrap_or_else(|| error.code.to_string()))
-    })
+    Tree::read(source)?.to()
 }
 
 /// Finds and parses the spec of `kind` called `name`: a path, or a name in the library.
@@ -50,5 +48,5 @@ pub fn load<T: DeserializeOwned>(kind: Kind, name: &str) -> Result<T, SpecError>
 /// If RON cannot represent the value.
 pub fn to_text<T: serde::Serialize>(value: &T) -> Result<String, SpecError> {
     let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(12);
-    ron_text::to_text(value, pretty).map_err(|error| SpecError::plain("a spec", error.to_string()))
+    writer::to_text(value, pretty).map_err(|error| SpecError::plain("a spec", error.to_string()))
 }

@@ -1,7 +1,7 @@
 //! Checks of the keys of a fault.
 
 use super::{FaultKind, FaultSpec, FaultsSpec, FaultySensor};
-use zsim_base::spec::{Source, SpecError};
+use zsim_base::spec::{Position, Source, SpecError};
 
 /// Maximum number of faults: bounds the memory.
 const MAX_FAULTS: usize = 1000;
@@ -44,7 +44,7 @@ pub(super) fn about(source: &Source, index: usize, key: &str, message: String) -
         let code = text.split("//").next().unwrap_or_default();
         for (column, word) in words(code) {
             sensors += usize::from(word == "sensor");
-            let here = ron::error::Position { line: line + 1, col: code[..column].chars().count() + 1 };
+            let here = Position { line: line + 1, column: code[..column].chars().count() + 1 };
             if sensors == index + 1 && place.is_none() {
                 place = Some(here);
             }

@@ -1,7 +1,7 @@
 //! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, text_file};
+use zsim_base::spec::{Kind, NamedSpec, Position, Source, SpecError, text_file};
 
 /// Maximum number of arrival times in a file: bounds the memory.
 const MAX_ARRIVALS: usize = 1_000_000;
@@ -35,7 +35,7 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
             continue;
         }
         let wrong = |message: String| {
-            let place = ron::error::Position { line: index + 1, col: 1 };
+            let place = Position { line: index + 1, column: 1 };
             SpecError::at(file, place, message).with_help("one arrival time a line, s, in order; `#` before comments")
         };
         let last = arrivals_s.last().copied().unwrap_or(0.0);

@@ -92,7 +92,7 @@ fn input_hash(key: &str, input: &Value, folder: Option<&Path>) -> Result<InputHa
             files.extend(file_hash(&folder.join(&name))?.map(|content| (name, content)));
         }
     }
-    let text = serde_json::to_string(input)?;
+    let text = input.to_string();
     let files = files.iter().flat_map(|(name, content)| [name.as_bytes(), content.bytes()]);
     Ok(InputHash {
         full: ContentHash::of([key.as_bytes(), text.as_bytes()].into_iter().chain(files.clone())),

@@ -8,7 +8,7 @@ use super::tree::{GainRun, Journey, Tree};
 use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::StudyError;
 use crate::gains::GainsSpec;
-use zsim_base::spec::{Named, Source, SpecError};
+use zsim_base::spec::{Named, Source, SpecError, to_json};
 use zsim_dynamics::HeadSpec;
 use zsim_simulation::Simulation;
 
@@ -59,7 +59,7 @@ impl Plan {
         gains: GainsSpec,
         heads: Vec<Named<HeadSpec>>,
     ) -> Result<Self, StudyError> {
-        let named = heads.iter().map(|head| Ok((format!("head/{}", head.name), serde_json::to_value(head)?)));
+        let named = heads.iter().map(|head| Ok((format!("head/{}", head.name), to_json(head)?)));
         let named = named.collect::<Result<_, StudyError>>()?;
         let base =
             heads.into_iter().next().map_or_else(|| Ok(Tree::default()), |head| Tree::of(&GainRun { gains, head }))?;
@@ -188,7 +188,7 @@ impl Plan {
         let journey = inputs.journey(self.seed(index).unwrap_or_default());
         let journey = journey.map_err(|message| StudyError::Plan { what: "run", message })?;
         let hashes = self.hashes(inputs)?;
-        let rays = serde_json::to_string(&journey.simulation.ray_inputs()?)?;
+        let rays = journey.simulation.ray_inputs()?.to_string();
         let files = hashes.iter().map(|(_, hash)| hash.files.bytes());
         let recorded = hashes.iter().filter(|(key, _)| !is_after_recording(key)).map(|(_, hash)| hash.full.bytes());
         Ok(PlannedJourney {

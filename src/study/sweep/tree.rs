@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use zsim_base::random::Seed;
-use zsim_base::spec::{Named, NamedSpec, Source, SpecError, name_from};
+use zsim_base::spec::{self, Named, NamedSpec, Source, SpecError, name_from, to_json};
 use zsim_dynamics::HeadSpec;
 use zsim_estimation::EstimatorSpec;
 use zsim_motion::MotionSpec;
@@ -122,7 +122,7 @@ impl Tree {
 
     /// The tree of the inputs of a run.
     pub fn of<T: Serialize>(inputs: &T) -> Result<Self, StudyError> {
-        let Value::Object(mut inputs) = serde_json::to_value(inputs)? else { return Ok(Self::default()) };
+        let Value::Object(mut inputs) = to_json(inputs)? else { return Ok(Self::default()) };
         inputs.retain(|key, _| key != SEED);
         Ok(Self(inputs))
     }
@@ -225,7 +225,8 @@ impl Tree {
 }
 
 fn read<T: DeserializeOwned>(inputs: Map<String, Value>) -> Result<T, String> {
-    serde_json::from_value(Value::Object(inputs)).map_err(|error| error.to_string())
+    let tree = spec::Tree::from_json("the inputs of a run", &Value::Object(inputs));
+    tree.to().map_err(|error| error.message().to_owned())
 }
 
 /// Loads the spec `name` for the key `key` of a tree.
@@ -237,7 +238,7 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
     where
         StudyError: From<T::Error>,
     {
-        Ok(serde_json::to_value(Named::<T>::load(name)?)?)
+        Ok(to_json(&Named::<T>::load(name)?)?)
     }
     match key {
         "scene" => load::<SceneSpec>(name),
@@ -255,7 +256,7 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zsim_base::spec::{self, Kind, names};
+    use zsim_base::spec::{Kind, names};
 
     fn base() -> Tree {
         let source = spec::find(Kind::Study, "integrity").unwrap();
