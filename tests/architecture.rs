@@ -5,9 +5,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod drawing;
 mod imports;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules of the room `base`, in order: each may use the modules before it.
@@ -67,7 +68,7 @@ const BELOW_CLI: &[&str] = &[
 const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
     ("anyhow", &["cli"]),
     ("base64", &["report"]),
-    ("cdr-encoding", &["recording"]),
+    ("cdr", &["recording"]),
     ("clap", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("cmaes", &["study"]),
@@ -170,6 +171,23 @@ fn rooms_depend_only_on_allowed_rooms_and_crates() {
     let found: Vec<String> = manifests.iter().flat_map(|(room, manifest)| violations(room, manifest)).collect();
     assert!(found.is_empty(), "{}", found.join("\n"));
     assert_eq!(manifests.len(), ROOMS.len(), "a room of the table is missing");
+}
+
+/// Update with `ZSIM_UPDATE=1 cargo test --release --test architecture the_drawing`.
+#[test]
+fn the_drawing_of_the_rooms_is_current() {
+    let rooms_of = |manifest: &str| -> BTreeSet<String> {
+        let names = dependencies(manifest).into_iter().filter_map(|name| name.strip_prefix("zsim-").map(str::to_owned));
+        names.filter(|name| ROOMS.iter().any(|(room, _)| room == name)).collect()
+    };
+    let uses: drawing::Uses = manifests().iter().map(|(room, text)| (room.clone(), rooms_of(text))).collect();
+    let drawn = drawing::svg(&uses);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures/rooms.svg");
+    if std::env::var_os("ZSIM_UPDATE").is_some() {
+        std::fs::write(&path, &drawn).unwrap();
+    }
+    let current = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(current == drawn, "{} is not of the manifests of today", path.display());
 }
 
 #[test]

@@ -1,16 +1,10 @@
 //! The commands: output, files and errors.
 
-use crate::command::run;
+use crate::command::{run, zsim};
 use crate::skip;
-use assert_cmd::Command;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-
-fn zsim(folder: &Path) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_zsim"));
-    command.current_dir(folder);
-    command
-}
+use std::path::PathBuf;
+use std::process::Command;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -225,7 +219,7 @@ fn every_shipped_scene_and_spec_is_valid() {
     let files: Vec<_> =
         files.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "ron")).collect();
     assert!(files.len() > 10);
-    let output = zsim(&root()).arg("check").args(&files).output().unwrap();
+    let output = zsim().current_dir(root()).arg("check").args(&files).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
@@ -269,7 +263,7 @@ fn manual_pages_are_well_formed() {
         }
     }
     // groff warns of unknown requests and of unbalanced macros.
-    let mut groff = std::process::Command::new("groff");
+    let mut groff = Command::new("groff");
     if let Some(formatted) = skip::run_or_skip("groff", groff.args(["-man", "-Tutf8", "-ww", "-z"]).args(&pages)) {
         let complaints = String::from_utf8_lossy(&formatted.stderr).into_owned();
         assert!(formatted.status.success() && complaints.is_empty(), "{complaints}");

@@ -1,19 +1,21 @@
 //! The commands `gains` and `spring`.
 
-use assert_cmd::Command;
-use predicates::prelude::*;
+use crate::command::{exits_with, zsim};
 use serde_json::Value;
 use std::path::Path;
 
-fn zsim(arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("zsim").unwrap();
-    command.args(arguments);
-    command
+/// Runs zsim, which must succeed; returns stdout.
+fn printed(arguments: &[&str]) -> String {
+    exits_with(0, zsim().args(arguments)).0
+}
+
+/// Runs zsim, which must find the usage or a spec invalid; returns stderr.
+fn complaint(arguments: &[&str]) -> String {
+    exits_with(2, zsim().args(arguments)).1
 }
 
 fn json(arguments: &[&str]) -> Value {
-    let output = zsim(arguments).assert().success().get_output().stdout.clone();
-    serde_json::from_slice(&output).unwrap()
+    serde_json::from_str(&printed(arguments)).unwrap()
 }
 
 #[test]
@@ -29,8 +31,7 @@ fn gains_writes_a_table_and_plots() {
     // The odd multiples of 0.1 Hz up to 3 Hz.
     assert_eq!(table.lines().count(), 1 + 6 * 15);
     assert!(table.contains("\nx_rot,") && table.contains("\nx,"));
-    let words = zsim(&quick).args(["--out", here.path().join("words").to_str().unwrap()]).assert().success();
-    let words = String::from_utf8(words.get_output().stdout.clone()).unwrap();
+    let words = printed(&[&quick[..], &["--out", here.path().join("words").to_str().unwrap()]].concat());
     assert!(words.contains("rotation about x") && words.contains("translation along x"), "{words}");
     assert!(!words.contains("x_rot"), "{words}");
     for file in ["plots/gains.svg", "plots/gains.png", "plots/coherence.svg", "plots/coherence.png", "report.html"] {
@@ -50,12 +51,12 @@ fn spring_describes_a_head_and_a_single_spring() {
     let fallen = json(&["spring", file.to_str().unwrap(), "--json"]);
     assert_eq!(fallen["stands"], false);
     assert!(fallen["heaviest_head_kg"].as_f64().unwrap() < 0.35);
-    zsim(&["spring", file.to_str().unwrap()]).assert().success().stdout(predicate::str::contains("cannot stand"));
+    assert!(printed(&["spring", file.to_str().unwrap()]).contains("cannot stand"));
 }
 
 /// Runs `spring` on a head or spring with `--out`; returns the page and the figures.
 fn spring_files(of: &str, out: &Path) -> (String, Value) {
-    zsim(&["spring", of, "--out", out.to_str().unwrap()]).assert().success();
+    printed(&["spring", of, "--out", out.to_str().unwrap()]);
     let figures = std::fs::read_to_string(out.join("spring.json")).unwrap();
     (std::fs::read_to_string(out.join("report.html")).unwrap(), serde_json::from_str(&figures).unwrap())
 }
@@ -120,7 +121,7 @@ fn coverage_needs_no_scene() {
     assert_eq!((lines("coverage.csv"), lines("density.csv")), (1 + 120, 1 + 2048));
     assert!(out.join("coverage.png").is_file());
     let still = ["coverage", "--head", "rigid", "--motion", "stand", "--duration", "1s"];
-    zsim(&still).assert().success().stdout(predicate::str::contains("observed fraction of the sphere"));
+    assert!(printed(&still).contains("observed fraction of the sphere"));
 }
 
 #[test]
@@ -136,21 +137,21 @@ fn invalid_usage_exits_with_2_and_a_message() {
         (&["coverage", "--duration", "0s"][..], "above 0 s"),
         (&["coverage", "--duration", "10ms"][..], "less than two scans"),
     ] {
-        zsim(arguments).assert().code(2).stderr(predicate::str::contains(sentence));
+        let stderr = complaint(arguments);
+        assert!(stderr.contains(sentence), "{stderr}");
     }
 }
 
 #[test]
 fn the_shipped_studies_and_springs_are_valid() {
-    zsim(&["check", "specs/studies/spring_design.ron", "specs/studies/spring_stock.ron"]).assert().success();
+    printed(&["check", "specs/studies/spring_design.ron", "specs/studies/spring_stock.ron"]);
 }
 
 #[test]
 fn gains_and_spring_refuse_a_mount_without_a_spring() {
     for arguments in [["gains", "--head", "spinning"], ["gains", "--head", "trawling"]] {
-        let message = predicate::str::contains("there is no spring, hence nothing to characterise");
-        zsim(&arguments).assert().code(2).stderr(message);
+        assert!(complaint(&arguments).contains("there is no spring, hence nothing to characterise"));
     }
-    zsim(&["spring", "nodding"]).assert().code(2).stderr(predicate::str::contains("a motor turns the head"));
-    zsim(&["check", "spinning", "nodding", "trawling"]).assert().success();
+    assert!(complaint(&["spring", "nodding"]).contains("a motor turns the head"));
+    printed(&["check", "spinning", "nodding", "trawling"]);
 }

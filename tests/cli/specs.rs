@@ -1,6 +1,8 @@
 //! `zsim spec`: schemas and reference agree with the types and with the shipped specs.
 
-use assert_cmd::Command;
+use crate::command::{exits_with, zsim};
+use crate::recording::readers::python;
+use crate::skip::run_or_skip;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -19,9 +21,7 @@ use zsim::world::SceneSpec;
 
 fn printed(verb: &str, kind: Kind) -> String {
     let kind = kind.noun().to_lowercase();
-    let output = Command::new(env!("CARGO_BIN_EXE_zsim")).args(["spec", verb, &kind]).output().unwrap();
-    assert!(output.status.success(), "{verb} {kind}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    exits_with(0, zsim().args(["spec", verb, &kind])).0
 }
 
 /// The shipped spec `name` as JSON; `None` if the text is not a `T`.
@@ -46,30 +46,42 @@ fn shipped(kind: Kind, name: &str) -> Value {
     json.unwrap_or_else(|| panic!("{}/{name} does not parse", kind.folder()))
 }
 
+/// The errors of each value by the schema of its kind, by an independent validator; `None` if it is not installed.
+fn validated(values: &[(Kind, Value)]) -> Option<Vec<Vec<String>>> {
+    let schema = |kind| serde_json::from_str::<Value>(&printed("schema", kind)).unwrap();
+    let schemas: serde_json::Map<String, Value> =
+        Kind::ALL.into_iter().map(|kind| (kind.noun().to_owned(), schema(kind))).collect();
+    let values: Vec<Value> = values.iter().map(|(kind, value)| json!([kind.noun(), value])).collect();
+    let here = tempfile::tempdir().unwrap();
+    let file = here.path().join("specs.json");
+    std::fs::write(&file, json!({ "schemas": schemas, "values": values }).to_string()).unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/check_schemas.py");
+    let output = run_or_skip("jsonschema", python().args([&script, &file]))?;
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
 #[test]
 fn every_shipped_spec_matches_the_schema_of_its_kind() {
-    for kind in Kind::ALL {
-        let schema: Value = serde_json::from_str(&printed("schema", kind)).unwrap();
-        let validator = jsonschema::validator_for(&schema).unwrap();
-        for name in names(kind) {
-            let errors: Vec<String> =
-                validator.iter_errors(&shipped(kind, &name)).map(|error| error.to_string()).collect();
-            assert!(errors.is_empty(), "{}/{name}: {errors:?}", kind.folder());
-        }
+    let of_kind = |kind| names(kind).into_iter().map(move |name| (kind, name));
+    let specs: Vec<(Kind, String)> = Kind::ALL.into_iter().flat_map(of_kind).collect();
+    let values: Vec<(Kind, Value)> = specs.iter().map(|(kind, name)| (*kind, shipped(*kind, name))).collect();
+    for ((kind, name), errors) in specs.iter().zip(validated(&values).into_iter().flatten()) {
+        assert!(errors.is_empty(), "{}/{name}: {errors:?}", kind.folder());
     }
 }
 
 #[test]
 fn a_schema_rejects_what_the_parser_rejects() {
-    let schema: Value = serde_json::from_str(&printed("schema", Kind::Imu)).unwrap();
-    let validator = jsonschema::validator_for(&schema).unwrap();
     let valid = shipped(Kind::Imu, "3dm_gx2");
-    assert!(validator.is_valid(&valid));
+    let mut values = vec![(Kind::Imu, valid.clone())];
     for (key, value) in [("rate_hz", json!(0.0)), ("rate_hz", json!("fast")), ("unknown_key", json!(1.0))] {
         let mut changed = valid.clone();
-        changed[key] = value.clone();
-        assert!(!validator.is_valid(&changed), "{key}: {value}");
+        changed[key] = value;
+        values.push((Kind::Imu, changed));
     }
+    let Some(errors) = validated(&values) else { return };
+    assert_eq!(errors.iter().map(Vec::is_empty).collect::<Vec<_>>(), [true, false, false, false], "{errors:?}");
 }
 
 /// Update with `for kind in $(ls docs/reference); do zsim spec reference ${kind%.md} > docs/reference/$kind; done`.
@@ -85,15 +97,11 @@ fn the_reference_in_docs_is_current() {
 
 #[test]
 fn list_and_show_print_the_shipped_specs() {
-    let zsim = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_zsim")).args(arguments).output().unwrap();
-        (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
-    };
-    let (code, list, _) = zsim(&["spec", "list", "imu"]);
-    assert!(code == Some(0) && list.contains("specs/imus") && list.contains("3dm_gx2"), "{list}");
-    let (_, text, _) = zsim(&["spec", "show", "imu", "3dm_gx2"]);
+    let (list, _) = exits_with(0, zsim().args(["spec", "list", "imu"]));
+    assert!(list.contains("specs/imus") && list.contains("3dm_gx2"), "{list}");
+    let (text, _) = exits_with(0, zsim().args(["spec", "show", "imu", "3dm_gx2"]));
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/imus/3dm_gx2.ron");
     assert_eq!(text, std::fs::read_to_string(shipped).unwrap());
-    let (code, _, message) = zsim(&["spec", "show", "imu", "no_such_imu"]);
-    assert!(code == Some(2) && message.contains("3dm_gx2"), "{code:?} {message}");
+    let (_, message) = exits_with(2, zsim().args(["spec", "show", "imu", "no_such_imu"]));
+    assert!(message.contains("3dm_gx2"), "{message}");
 }

@@ -10,7 +10,7 @@ mod live;
 mod map;
 mod points;
 mod programs;
-mod readers;
+pub mod readers;
 mod result;
 mod round_trip;
 

@@ -18,7 +18,7 @@ fn recording_in(folder: &Path) -> PathBuf {
 }
 
 /// The Python interpreter named by `ZSIM_PYTHON`, else `python3`.
-pub(super) fn python() -> Command {
+pub fn python() -> Command {
     Command::new(std::env::var("ZSIM_PYTHON").unwrap_or_else(|_| "python3".to_owned()))
 }
 

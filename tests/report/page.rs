@@ -1,6 +1,6 @@
 //! The pages of zsim in a headless browser.
 
-use crate::command::run;
+use crate::command::{exits_with, run, zsim};
 use crate::hostile_scene::hostile_scene;
 use crate::skip::run_or_skip;
 use std::path::Path;
@@ -73,8 +73,7 @@ fn the_page_of_a_study_works_in_a_browser() {
     // The page shows its own path in a command.
     let folder = "it's <script>window.hostile=5;";
     let study = |arguments: &[&str]| {
-        let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_zsim"));
-        command.current_dir(here.path()).args(arguments).assert().success();
+        exits_with(0, zsim().current_dir(here.path()).args(arguments));
     };
     study(&["study", "coil.ron", "--out", folder]);
     use_in_a_browser(&here.path().join(folder).join("report.html"));

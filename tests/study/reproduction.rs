@@ -1,6 +1,6 @@
 //! The paper's experiments: fit of damping ratios, and resumption after a stop.
 
-use assert_cmd::Command;
+use crate::command::{exits_with, zsim};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -148,26 +148,20 @@ fn a_stopped_experiment_resumes_with_the_same_result() {
     assert!(error.to_string().contains("another experiment"), "{error}");
 }
 
-fn zsim(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("zsim").unwrap();
-    command.current_dir(folder).args(arguments);
-    command
-}
-
 #[test]
 fn the_command_writes_the_table_and_a_second_call_does_not_change_it() {
     let here = tempfile::tempdir().unwrap();
     let path = small(here.path());
     let arguments = ["reproduce", path.to_str().unwrap(), "--quick", "--json"];
-    let printed = zsim(here.path(), &arguments).assert().success().get_output().stdout.clone();
-    let printed: serde_json::Value = serde_json::from_slice(&printed).unwrap();
+    let (printed, _) = exits_with(0, zsim().current_dir(here.path()).args(arguments));
+    let printed: serde_json::Value = serde_json::from_str(&printed).unwrap();
     assert_eq!(printed["out"], "results/paper-quick");
     assert_eq!(printed["experiments"][0]["rows"].as_array().unwrap().len(), 7);
     let table = std::fs::read_to_string(here.path().join("results/paper-quick.md")).unwrap();
     assert!(table.contains("| 3a | peak gain, rate about y | about 15 | within a factor of 1.5 | "), "{table}");
     assert!(table.contains("## fig3\n\n- Not finished yet."), "{table}");
     let before = files(&here.path().join("results"));
-    zsim(here.path(), &arguments).assert().success();
+    exits_with(0, zsim().current_dir(here.path()).args(arguments));
     assert!(files(&here.path().join("results")) == before);
 }
 
@@ -185,12 +179,12 @@ fn invalid_experiments_exit_with_2_and_a_message() {
     ] {
         let file = here.path().join(format!("{name}.ron"));
         std::fs::write(&file, text.replacen(from, to, 1)).unwrap();
-        let mut command = zsim(here.path(), &["reproduce", file.to_str().unwrap(), "--quick"]);
-        let stderr = command.assert().code(2).get_output().stderr.clone();
-        assert!(String::from_utf8(stderr).unwrap().contains(sentence), "{name}");
+        let arguments = ["reproduce", file.to_str().unwrap(), "--quick"];
+        let (_, stderr) = exits_with(2, zsim().current_dir(here.path()).args(arguments));
+        assert!(stderr.contains(sentence), "{name}: {stderr}");
     }
-    let stderr = zsim(here.path(), &["reproduce", "fig99"]).assert().code(2).get_output().stderr.clone();
-    assert!(String::from_utf8(stderr).unwrap().contains("fig3"), "the error lists the known experiments");
+    let (_, stderr) = exits_with(2, zsim().current_dir(here.path()).args(["reproduce", "fig99"]));
+    assert!(stderr.contains("fig3"), "the error lists the known experiments");
 }
 
 #[test]

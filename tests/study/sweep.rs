@@ -1,11 +1,10 @@
 //! Sweeps: reproducible tables with any processes, threads and stops, and failures as rows.
 
 use crate::command::run;
-use assert_cmd::Command;
 use rand::RngExt;
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command as Process, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use zsim::random::Seed;
 
@@ -42,7 +41,7 @@ fn parts(folder: &Path) -> usize {
 /// Starts `run` in a process and kills it some time after `enough` tasks are done. Returns whether it had ended
 /// before.
 fn run_and_kill(folder: &Path, enough: usize, after: Duration) -> bool {
-    let mut child = Process::new(ZSIM)
+    let mut child = Command::new(ZSIM)
         .args(["sweep", "run", "--quiet", "--threads", "2", "swept"])
         .current_dir(folder)
         .stdout(Stdio::null())

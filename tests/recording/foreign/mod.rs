@@ -124,9 +124,7 @@ pub fn transform(parent: &str, child: &str, x: f64) -> TransformStamped {
 }
 
 pub fn cdr(message: &impl Serialize) -> Vec<u8> {
-    let mut bytes = vec![0, 1, 0, 0];
-    bytes.extend(cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message).unwrap());
-    bytes
+    cdr::serialize::<_, _, cdr::CdrLe>(message, cdr::Infinite).unwrap()
 }
 
 /// Writes files with the `mcap` crate.
