@@ -65,14 +65,13 @@ const BELOW_CLI: &[&str] = &[
 ];
 
 /// Crates that are restricted to some rooms, and these rooms.
-const RESTRICTED_CRATES: [(&str, &[&str]); 23] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 22] = [
     ("anyhow", &["cli"]),
     ("base64", &["report"]),
     ("cdr", &["recording"]),
     ("clap", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("cmaes", &["study"]),
-    ("faer", &["estimation", "evaluation"]),
     ("http-body-util", &["cli"]),
     ("hyper", &["cli"]),
     ("hyper-util", &["cli"]),

@@ -1,7 +1,6 @@
 //! Sparse symmetric matrix of 6 x 6 blocks.
 
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use super::band_cholesky::BandCholesky;
 use nalgebra::{Matrix6, Vector6};
 
 /// Sparse symmetric matrix of 6 x 6 blocks; stores the lower triangle by rows.
@@ -75,31 +74,12 @@ impl BlockMatrix {
         }
     }
 
-    /// Cholesky factor; `None` if the matrix is not positive definite.
-    pub(super) fn factor(&self) -> Option<Llt<usize, f64>> {
-        let (starts, rows, values) = self.upper_by_columns();
-        let size = 6 * self.columns.len();
-        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &starts, None, &rows);
-        let symbolic = SymbolicLlt::try_new(pattern, faer::Side::Upper).ok()?;
-        Llt::try_new_with_symbolic(symbolic, SparseColMatRef::new(pattern, &values), faer::Side::Upper).ok()
-    }
-
-    /// Upper triangle in compressed columns: column starts, rows, values.
+    /// Cholesky factor, for blocks near the diagonal; `None` if the matrix is not positive definite.
     ///
-    /// A row of blocks below the diagonal is a column above it.
-    fn upper_by_columns(&self) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
-        let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
-        for (row, (columns, blocks)) in self.columns.iter().zip(&self.blocks).enumerate() {
-            for axis in 0..6 {
-                for (other, block) in columns.iter().map(|k| *k as usize).zip(blocks) {
-                    let until = if other == row { axis + 1 } else { 6 };
-                    rows.extend((0..until).map(|k| 6 * other + k));
-                    values.extend((0..until).map(|k| block[(axis, k)]));
-                }
-                starts.push(rows.len());
-            }
-        }
-        (starts, rows, values)
+    /// Every diagonal block is in the pattern.
+    pub(super) fn factor(&self) -> Option<BandCholesky> {
+        let rows = self.columns.iter().zip(&self.blocks);
+        BandCholesky::new(rows.map(|(columns, blocks)| (columns.as_slice(), blocks.as_slice())))
     }
 }
 

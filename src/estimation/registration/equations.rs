@@ -2,11 +2,10 @@
 //!
 //! Local terms couple neighbouring knots; their factor preconditions the conjugate gradients. Remote terms couple any knots.
 
+use super::band_cholesky::BandCholesky;
 use super::block_matrix::BlockMatrix;
 use super::conjugate_gradients::{self, PreconditionedSystem};
 use crate::spline::Basis;
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::Llt;
 use nalgebra::{Cholesky, Const, Matrix6, SMatrix, SVector, Vector6};
 
 /// Number of unknowns shared by all times: the range bias, m.
@@ -210,7 +209,7 @@ fn is_local(first: i64, second: i64) -> bool {
 /// Equations with a preconditioner: the local blocks and, separately, the block of the shared unknowns.
 struct LocallyPreconditioned<'a> {
     equations: &'a Equations,
-    local: Llt<usize, f64>,
+    local: BandCholesky,
     shared_term: Cholesky<f64, Const<SHARED_DIMENSION>>,
 }
 
@@ -232,8 +231,7 @@ impl PreconditionedSystem for LocallyPreconditioned<'_> {
 
     fn precondition(&self, z: &mut [f64]) {
         let (knots, shared) = z.split_at_mut(self.equations.right.len());
-        let size = knots.len();
-        self.local.solve_in_place(faer::MatMut::from_column_major_slice_mut(knots, size, 1));
+        self.local.solve_in_place(knots);
         let solved = self.shared_term.solve(&Shared::from_column_slice(shared));
         shared.copy_from_slice(solved.as_slice());
     }

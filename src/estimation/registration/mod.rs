@@ -22,6 +22,7 @@
 //!    trajectory and surfels; repeat until convergence. Then add the next finer resolution.
 //! 5. An implausible or weakly constrained solution is rejected, and the open-loop trajectory is returned.
 
+mod band_cholesky;
 mod block_matrix;
 mod conjugate_gradients;
 mod corrected_trajectory;

@@ -11,9 +11,7 @@
 
 use super::equations::{Equations, SHARED_DIMENSION};
 use crate::spline::Basis;
-use faer::linalg::solvers::DenseSolveCore;
-use faer::{Mat, Side};
-use nalgebra::{Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix6, SMatrix};
 use zsim_base::geometry::{Vector, skew};
 
 /// Covariances of a correction `[dr, dt]`, rad and m.
@@ -55,19 +53,19 @@ impl Reduction {
     ///
     /// `None` if the equations are singular.
     pub(super) fn covariances(&self, equations: &Equations, bases: &[Basis]) -> Option<Vec<CorrectionCovariance>> {
-        let inverse = self.information(equations).llt(Side::Lower).ok()?.inverse();
-        let of_times: Vec<_> = bases.iter().map(|basis| self.at(equations, basis)).collect();
-        let first = of_times.first()?;
-        let between = |rows: &Shares, columns: &Shares| {
-            let mut sum = Matrix6::zeros();
-            for ((row, by_row), (column, by_column)) in rows.iter().flat_map(|r| columns.iter().map(move |c| (r, c))) {
-                let block = Matrix6::from_fn(|r, c| inverse[(6 * row + r, 6 * column + c)]);
-                sum += by_row * block * by_column.transpose();
+        let factor = self.information(equations).cholesky()?;
+        // With the factor `L` of the information and the derivatives `S` of all corrections: `S (L L^T)^-1 S^T = W^T W`.
+        let mut white = DMatrix::zeros(factor.l_dirty().nrows(), 6 * bases.len());
+        for (at, basis) in bases.iter().enumerate() {
+            for (node, by) in self.at(equations, basis) {
+                white.fixed_view_mut::<6, 6>(6 * node, 6 * at).copy_from(&by.transpose());
             }
-            sum
-        };
-        let covariance = |at| CorrectionCovariance { own: between(at, at), with_first: between(at, first) };
-        Some(of_times.iter().map(covariance).collect())
+        }
+        factor.l_dirty().solve_lower_triangular_mut(&mut white).then_some(())?;
+        let of_time = |at: usize| white.fixed_columns::<6>(6 * at);
+        let between = |at: usize, other: usize| of_time(at).tr_mul(&of_time(other));
+        let covariance = |at| CorrectionCovariance { own: between(at, at), with_first: between(at, 0) };
+        Some((0..bases.len()).map(covariance).collect())
     }
 
     /// The correction at the time of `basis` as a function of those of the nodes.
@@ -85,9 +83,9 @@ impl Reduction {
     }
 
     /// The normal equations of the nodes, and of the shared unknowns after them.
-    fn information(&self, equations: &Equations) -> Mat<f64> {
+    fn information(&self, equations: &Equations) -> DMatrix<f64> {
         let of_nodes = 6 * self.nodes;
-        let mut information = Mat::zeros(of_nodes + SHARED_DIMENSION, of_nodes + SHARED_DIMENSION);
+        let mut information = DMatrix::zeros(of_nodes + SHARED_DIMENSION, of_nodes + SHARED_DIMENSION);
         for (row, column, block) in equations.blocks() {
             for (node, by) in &self.shares[row] {
                 for (other, by_other) in &self.shares[column] {
@@ -120,7 +118,7 @@ pub(super) fn carried(lever: &Vector) -> Matrix6<f64> {
     carried
 }
 
-fn add<const R: usize, const C: usize>(into: &mut Mat<f64>, row: usize, column: usize, block: &SMatrix<f64, R, C>) {
+fn add<const R: usize, const C: usize>(into: &mut DMatrix<f64>, row: usize, column: usize, block: &SMatrix<f64, R, C>) {
     for (c, of_column) in block.column_iter().enumerate() {
         for (r, value) in of_column.iter().enumerate() {
             into[(row + r, column + c)] += value;

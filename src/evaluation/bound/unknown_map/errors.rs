@@ -5,8 +5,7 @@ use super::super::motion::{attitude_jacobian, head_in_world, position_jacobian};
 use super::chain::{CONSTANTS, OWN, columns};
 use super::dense::Information;
 use super::problem::Problem;
-use faer::Mat;
-use nalgebra::{Matrix6, SMatrix, Vector6};
+use nalgebra::{DMatrix, Matrix6, SMatrix, Vector6};
 use zsim_base::geometry::{Vector, skew};
 use zsim_base::time::{Span, Stamp};
 
@@ -14,9 +13,9 @@ use zsim_base::time::{Span, Stamp};
 const OUTPUTS: usize = 6;
 
 /// The bound at the kept epochs, after the rigid alignment of the positions. `None` if the information is singular.
-pub(super) fn bound(problem: &Problem<'_>, start: Stamp, information: &Information) -> Option<InformationBound> {
+pub(super) fn bound(problem: &Problem<'_>, start: Stamp, information: Information) -> Option<InformationBound> {
     let kept = &problem.kept;
-    let mut white = information.whiten(outputs(problem, kept).as_ref())?;
+    let mut white = information.whitened(&outputs(problem, kept))?;
     let alignment = Alignment::of(problem, kept);
     (0..white.nrows()).for_each(|row| alignment.apply(row, &mut white));
     let variance = |column: usize| (0..white.nrows()).map(|row| white[(row, column)].powi(2)).sum::<f64>();
@@ -46,8 +45,8 @@ pub(super) fn bound(problem: &Problem<'_>, start: Stamp, information: &Informati
 
 /// The reported errors as combinations of the states: position and attitude of each kept epoch, then clock offset at the
 /// end, and range offset.
-fn outputs(problem: &Problem<'_>, kept: &[usize]) -> Mat<f64> {
-    let mut across = Mat::zeros(CONSTANTS + OWN * kept.len(), OUTPUTS * kept.len() + 2);
+fn outputs(problem: &Problem<'_>, kept: &[usize]) -> DMatrix<f64> {
+    let mut across = DMatrix::zeros(CONSTANTS + OWN * kept.len(), OUTPUTS * kept.len() + 2);
     for (index, epoch) in kept.iter().enumerate() {
         let (at, since_start_s) = (&problem.epochs[*epoch], problem.since_start_s(*epoch));
         let position = position_jacobian(&problem.model, at, since_start_s);
@@ -91,7 +90,7 @@ impl Alignment {
     }
 
     /// Subtracts the rigid motion from the errors in a row.
-    fn apply(&self, row: usize, errors: &mut Mat<f64>) {
+    fn apply(&self, row: usize, errors: &mut DMatrix<f64>) {
         let mut moment = Vector6::zeros();
         for (index, (rigid, weight)) in self.rigid.iter().zip(&self.weights).enumerate() {
             let position = Vector::from_fn(|axis, _| errors[(row, OUTPUTS * index + axis)]);

@@ -8,6 +8,8 @@
 //! its position and heading are known. The errors are reported after the rigid alignment that the evaluation uses, which
 //! removes the choice of the reference.
 
+mod block;
+mod block_triangle;
 mod chain;
 mod dense;
 mod division;
@@ -44,7 +46,7 @@ const BATCH: usize = 4;
 /// singular.
 fn information(problem: &Problem<'_>) -> Option<Information> {
     let planes = 3 * problem.joint.count();
-    let mut sum = Information::zeros(planes + CONSTANTS + OWN * problem.kept.len());
+    let mut sum = Information::zeros(planes, CONSTANTS + OWN * problem.kept.len());
     let mut states = planes + CONSTANTS;
     for batch in problem.segments.chunks(BATCH) {
         let kept: Vec<Option<Kept>> = batch.par_iter().map(|segment| keep(problem, segment)).collect();
@@ -59,7 +61,7 @@ fn information(problem: &Problem<'_>) -> Option<Information> {
         }
     }
     add_priors(problem, &mut sum);
-    sum.without_first(planes)
+    sum.marginalised()
 }
 
 fn add_priors(problem: &Problem<'_>, sum: &mut Information) {
@@ -96,7 +98,7 @@ pub(super) fn bound(
     let model = with_minimum_noise(model, seconds);
     let problem = Problem { model, epochs, sightings, segments, kept, joint, prior };
     let information = information(&problem).ok_or(EvaluationError::Singular { measure: MEASURE })?;
-    errors::bound(&problem, start, &information).ok_or(EvaluationError::Singular { measure: MEASURE })
+    errors::bound(&problem, start, information).ok_or(EvaluationError::Singular { measure: MEASURE })
 }
 
 const MEASURE: &str = "the information bound with an unknown map";

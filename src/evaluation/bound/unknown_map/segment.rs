@@ -48,8 +48,9 @@ impl Layout<'_> {
         Some(self.constants() + CONSTANTS + 3 * at)
     }
 
-    fn size(&self) -> usize {
-        self.constants() + CONSTANTS + 3 * self.planes.len()
+    /// Number of variables that are kept.
+    fn kept_size(&self) -> usize {
+        OWN * self.kept.len() + CONSTANTS + 3 * self.planes.len()
     }
 
     /// Attitude and position at an epoch, clock offset, clock rate and range offset.
@@ -79,7 +80,7 @@ pub(super) fn keep(problem: &Problem<'_>, segment: &Segment) -> Option<Kept> {
     planes.sort_unstable();
     planes.dedup();
     let layout = Layout { kept: &segment.kept, planes };
-    let mut information = Information::zeros(layout.size());
+    let mut information = Information::zeros(layout.interior(), layout.kept_size());
     for epoch in layout.first()..layout.last() {
         add_step(problem, &layout, epoch, &mut information)?;
     }
@@ -92,7 +93,7 @@ pub(super) fn keep(problem: &Problem<'_>, segment: &Segment) -> Option<Kept> {
     for plane in local.into_values() {
         plane.marginalise(&mut information)?;
     }
-    let information = information.without_first(layout.interior())?;
+    let information = information.marginalised()?;
     Some(Kept { planes: layout.planes, information })
 }
 
