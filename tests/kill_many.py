@@ -135,7 +135,7 @@ class SweepCheck:
         self.reference = self.table(killer, f"{self.name}-whole")
 
     def table(self, killer, folder):
-        return [(killer.folder / folder / name).read_bytes() for name in ("table.csv", "table.parquet")]
+        return [(killer.folder / folder / name).read_bytes() for name in ("table.csv", "table.schema.json")]
 
     def kill(self, killer):
         folder = f"{self.name}-cut"

@@ -137,8 +137,15 @@ def test_a_sweep_is_a_table(tmp_path):
     table = zsim.sweep(spec, tmp_path / "out", progress=lambda stage, fraction: shown.append((stage, fraction)))
     assert list(table["wire_diameter_mm"]) == [3.0, 3.2, 3.4]
     assert table["rocking_hz"].is_monotonic_increasing
-    assert zsim.read_sweep(tmp_path / "out", to="polars").shape[0] == 3
-    assert zsim.read_sweep(tmp_path / "out", to="pyarrow").column("spring_mass_g").null_count == 0
+    assert [str(table[name].dtype) for name in ("point", "rocking_hz")] == ["int64", "float64"]
+    assert table["error"].isna().all()
+    frame = zsim.read_sweep(tmp_path / "out", to="polars")
+    assert frame["rocking_hz"].to_list() == list(table["rocking_hz"])
+    assert [str(frame.schema[name]) for name in ("point", "rocking_hz", "error")] == ["Int64", "Float64", "String"]
+    arrow = zsim.read_sweep(tmp_path / "out", to="pyarrow")
+    assert arrow.column("rocking_hz").to_pylist() == list(table["rocking_hz"])
+    assert [arrow.column(name).null_count for name in ("spring_mass_g", "error")] == [0, 3]
+    assert [str(arrow.schema.field(name).type) for name in ("point", "error")] == ["int64", "string"]
     with pytest.raises(zsim.InputError, match="pandas"):
         zsim.read_sweep(tmp_path / "out", to="excel")
     with pytest.raises(zsim.InputError, match="sweep merge"):

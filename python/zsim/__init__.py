@@ -10,6 +10,7 @@ with z up; a transform `a_from_b` maps coordinates in `b` to coordinates in `a`.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -151,26 +152,48 @@ def sweep(
 def read_sweep(folder: _Path, *, to: _Table = "pandas") -> Any:
     """Reads the table of a sweep or study in `folder`, a row per run: parameters, seed, measures, error."""
     read = _reader_of_tables(to)
-    table = Path(folder) / "table.parquet"
-    if not table.exists():
-        raise InputError(f"{table} is missing: `zsim sweep merge {folder}` writes it")
-    return read(table)
+    table, schema = (Path(folder) / name for name in ("table.csv", "table.schema.json"))
+    for path in (table, schema):
+        if not path.exists():
+            raise InputError(f"{path} is missing: `zsim sweep merge {folder}` writes it")
+    fields = json.loads(schema.read_text(encoding="utf-8"))["fields"]
+    return read(table, {field["name"]: field["type"] for field in fields})
 
 
-def _reader_of_tables(to: str) -> Callable[[Path], Any]:
+def _reader_of_tables(to: str) -> Callable[[Path, dict[str, str]], Any]:
+    """A function that reads a CSV file with these types of columns; an empty cell is missing."""
     if to == "pandas":
         import pandas
 
-        return pandas.read_parquet
+        return lambda path, types: pandas.read_csv(
+            path,
+            dtype=_each(types, {"integer": "int64", "number": "float64", "string": "str"}),
+            keep_default_na=False,
+            na_values=[""],
+            float_precision="round_trip",
+        )
     if to == "polars":
         import polars
 
-        return polars.read_parquet
+        dtypes = {"integer": polars.Int64, "number": polars.Float64, "string": polars.String}
+        return lambda path, types: polars.read_csv(path, schema=_each(types, dtypes))
     if to == "pyarrow":
-        import pyarrow.parquet
+        import pyarrow
+        from pyarrow import csv
 
-        return pyarrow.parquet.read_table
+        dtypes = {"integer": pyarrow.int64(), "number": pyarrow.float64(), "string": pyarrow.string()}
+        return lambda path, types: csv.read_csv(
+            path,
+            parse_options=csv.ParseOptions(newlines_in_values=True),
+            convert_options=csv.ConvertOptions(
+                column_types=_each(types, dtypes), null_values=[""], strings_can_be_null=True
+            ),
+        )
     raise InputError(f'to="{to}": use "pandas", "polars" or "pyarrow"')
+
+
+def _each(types: dict[str, str], dtypes: dict[str, Any]) -> dict[str, Any]:
+    return {name: dtypes[of] for name, of in types.items()}
 
 
 def _trajectory(given: Trajectory | _Path) -> Trajectory:

@@ -77,7 +77,8 @@ pub(super) fn write_text(folder: &Path, target: &Path, text: &str) -> Result<(),
     write_bytes(folder, target, text.as_bytes())
 }
 
-fn write_bytes(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), StudyError> {
+/// Writes a file atomically, with the temporary file in `folder`.
+pub(super) fn write_bytes(folder: &Path, target: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     let mut partial = AtomicFile::new(folder, target)?;
     partial.write_all(bytes).map_err(StudyError::file(target))?;
     partial.finish()

@@ -1,4 +1,3 @@
-use parquet::errors::ParquetError;
 use std::path::{Path, PathBuf};
 use zsim_base::signal::SignalError;
 use zsim_base::spec::SpecError;
@@ -68,13 +67,13 @@ pub enum StudyError {
         /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A table could not be written or read.
-    #[error("{}: {source}", path.display())]
+    /// A table is damaged.
+    #[error("{}: {message}", path.display())]
     Table {
         /// Path of the table.
         path: PathBuf,
-        /// Error of the Parquet library.
-        source: Box<ParquetError>,
+        /// The problem.
+        message: String,
     },
     /// A run of a sweep exceeded the time limit.
     #[error("took longer than {time_s} s")]
@@ -124,9 +123,9 @@ impl StudyError {
         move |source| Self::File { path, source }
     }
 
-    pub(super) fn table(path: &Path) -> impl FnOnce(ParquetError) -> Self + use<> {
+    pub(super) fn table(path: &Path) -> impl FnOnce(String) -> Self + use<> {
         let path = path.to_owned();
-        move |source| Self::Table { path, source: Box::new(source) }
+        move |message| Self::Table { path, message }
     }
 
     /// Whether the input is invalid (a spec, a setting), as opposed to a failure during the run.

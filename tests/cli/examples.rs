@@ -11,7 +11,7 @@ const EXAMPLES: [(&str, &[&str]); 7] = [
     ("own_recording", &["estimate/metrics.json", "estimate/cloud.ply", "estimate/report.html"]),
     ("own_scene", &["workshop.svg", "workshop/metrics.json", "workshop/report.html"]),
     ("spring_design", &["springs/pareto.csv", "springs/pareto.svg"]),
-    ("sweep", &["sweep/slurm/array.sh", "sweep/table.parquet", "sweep/study.md"]),
+    ("sweep", &["sweep/slurm/array.sh", "sweep/table.csv", "sweep/study.md"]),
     ("viewers", &["recording.mcap", "estimate/result.mcap", "head/head.urdf"]),
 ];
 

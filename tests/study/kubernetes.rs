@@ -57,7 +57,7 @@ fn an_indexed_job_with_killed_pods_gives_the_bytes_of_a_local_run() {
     zsim(here.path(), "sweep merge cluster");
     zsim(here.path(), "sweep run local");
     zsim(here.path(), "sweep merge local");
-    for file in ["table.parquet", "table.csv"] {
+    for file in ["table.csv", "table.schema.json"] {
         let table = |name: &str| std::fs::read(here.path().join(name).join(file)).unwrap();
         assert!(table("cluster") == table("local"), "{file}");
     }

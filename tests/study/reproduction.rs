@@ -91,7 +91,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     while let Some(next) = folders.pop() {
         for entry in std::fs::read_dir(next).unwrap() {
             let path = entry.unwrap().path();
-            if path.ends_with("parts") || path.ends_with("times.parquet") {
+            if path.ends_with("parts") || path.ends_with("times.csv") {
                 continue;
             }
             if path.is_dir() {

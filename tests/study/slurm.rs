@@ -91,7 +91,7 @@ fn a_job_array_gives_the_bytes_of_a_local_run() {
     zsim(None, here.path(), "sweep run local");
     zsim(None, here.path(), "sweep merge local");
     let table = |name: &str, file: &str| std::fs::read(here.path().join(name).join(file)).unwrap();
-    for file in ["table.parquet", "table.csv"] {
+    for file in ["table.csv", "table.schema.json"] {
         assert!(table("slurm", file) == table("local", file), "{file}");
     }
     let stdout = zsim(Some(&cluster), here.path(), "sweep submit slurm --slurm --json");

@@ -2,14 +2,14 @@
 //!
 //! ```text
 //! plan.ron         the sweep's spec, all specs that it names, and the version of zsim
-//! points.parquet   the runs: index, values of the axes, seed, hash, and task
-//! parts/           finished runs: one table per simulated run or per 250 closed forms, named by its hash
+//! points.csv       the runs: index, values of the axes, seed, hash, and task
+//! parts/           finished runs: one file per simulated run or per 250 closed forms, named by its hash
 //! tmp/             files being written
 //! ```
 
 use super::axis::SpecSet;
 use super::identity::ContentHash;
-use super::table::{Column, ColumnType, Table, TableWriter};
+use super::table::{Column, ColumnType, TableWriter, open, read_columns};
 use super::tree::Tree;
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::StudyError;
@@ -21,8 +21,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use zsim_base::spec::{self, Source, SpecError, to_text};
 
-/// Rows in a row group of a Parquet table; bounds the memory of a merge.
-pub(super) const ROWS_PER_GROUP: u64 = 16_384;
+/// Number of runs that are hashed in parallel and written together to the table of runs.
+const RUNS_PER_GROUP: u64 = 16_384;
 
 /// Content of `plan.ron`.
 #[derive(Serialize, Deserialize)]
@@ -74,11 +74,13 @@ impl Plan {
             std::fs::create_dir_all(each).map_err(StudyError::file(each))?;
         }
         let plan = plan_path(folder);
-        let written = temporary.join("points.parquet");
+        let written = temporary.join("points.csv");
         let identity = self.write_points(&temporary, &written)?;
         let text = self.text_with(&identity.to_string())?;
+        let points = points_path(folder);
         if plan.exists() && std::fs::read_to_string(&plan).map_err(StudyError::file(&plan))? == text {
-            std::fs::remove_file(&written).map_err(StudyError::file(&written))?;
+            // The same content, unless the file is damaged or of a version with another format.
+            std::fs::rename(&written, &points).map_err(StudyError::file(&points))?;
             return Sweep::open(folder);
         }
         if plan.exists() && !anew {
@@ -88,7 +90,7 @@ impl Plan {
         if plan.exists() {
             std::fs::remove_file(&plan).map_err(StudyError::file(&plan))?;
         }
-        std::fs::rename(&written, points_path(folder)).map_err(StudyError::file(&written))?;
+        std::fs::rename(&written, &points).map_err(StudyError::file(&points))?;
         write_text(&temporary, &plan, &text)?;
         Sweep::open(folder)
     }
@@ -119,8 +121,8 @@ impl Plan {
         let mut table = TableWriter::create(temporary, target, &columns)?;
         let mut tasks: BTreeMap<ContentHash, i64> = BTreeMap::new();
         let mut all = Vec::new();
-        for first in (0..self.points()).step_by(ROWS_PER_GROUP as usize) {
-            let numbers: Vec<u64> = (first..(first + ROWS_PER_GROUP).min(self.points())).collect();
+        for first in (0..self.points()).step_by(RUNS_PER_GROUP as usize) {
+            let numbers: Vec<u64> = (first..(first + RUNS_PER_GROUP).min(self.points())).collect();
             let runs: Vec<(ContentHash, Option<ContentHash>)> =
                 numbers.par_iter().map(|index| self.hashes_of(*index)).collect::<Result<_, _>>()?;
             let task = |(index, (_, rays)): (&u64, &(ContentHash, Option<ContentHash>))| {
@@ -205,9 +207,14 @@ impl Sweep {
         let mut specs = SpecSet { base: file.base, named: file.named };
         let plan = Plan::with_specs(&file.name, &file.spec, &mut specs, &source)?;
         let path = points_path(folder);
-        let damaged = || SpecError::plain(path.display().to_string(), "does not match the plan: plan the sweep again");
-        let table = Table::open(&path)?.ok_or_else(damaged)?;
-        let hashes = table.column("id", ColumnType::Text)?.texts();
+        let damaged = || {
+            SpecError::plain(path.display().to_string(), "is missing or does not match the plan: plan the sweep again")
+        };
+        let columns = [("id", ColumnType::Text), ("task", ColumnType::Counts)];
+        let columns = open(&path)?.and_then(|file| read_columns(file, &columns).ok());
+        let mut columns = columns.ok_or_else(damaged)?;
+        let task_of_run = columns.pop().map_or_else(Vec::new, Column::counts);
+        let hashes = columns.pop().map_or_else(Vec::new, Column::texts);
         let identities: Option<Vec<ContentHash>> =
             hashes.iter().map(|hash| ContentHash::parse(hash.as_deref()?)).collect();
         let identities = identities.filter(|all| all.len() as u64 == plan.points()).ok_or_else(damaged)?;
@@ -216,7 +223,6 @@ impl Sweep {
         }
         let units = units(&plan, &identities);
         let mut tasks: BTreeMap<i64, Vec<u32>> = BTreeMap::new();
-        let task_of_run = table.column("task", ColumnType::Counts)?.counts();
         for (k, unit) in units.iter().enumerate() {
             let task = task_of_run.get(unit.first as usize).copied().flatten().ok_or_else(damaged)?;
             tasks.entry(task).or_default().push(k as u32);
@@ -237,7 +243,7 @@ impl Sweep {
 
     /// Path of a unit's part file.
     pub(super) fn part_path(&self, unit: &Unit) -> PathBuf {
-        parts_folder(&self.folder).join(format!("{}.parquet", unit.identity))
+        parts_folder(&self.folder).join(format!("{}.part", unit.identity))
     }
 
     /// Folder of files being written.
@@ -277,7 +283,7 @@ fn plan_path(folder: &Path) -> PathBuf {
 }
 
 fn points_path(folder: &Path) -> PathBuf {
-    folder.join("points.parquet")
+    folder.join("points.csv")
 }
 
 fn parts_folder(folder: &Path) -> PathBuf {

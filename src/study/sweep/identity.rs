@@ -5,6 +5,7 @@ use crate::StudyError;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::Path;
 
 /// First 128 bits of a SHA-256: collisions are negligible for any feasible number of runs.
@@ -19,6 +20,17 @@ impl ContentHash {
             hash.update((part.len() as u64).to_le_bytes());
             hash.update(part);
         }
+        Self::half(hash)
+    }
+
+    /// Hash of a stream of bytes, which is not kept in memory.
+    pub fn of_stream(stream: &mut impl Read) -> std::io::Result<Self> {
+        let mut hash = Sha256::new();
+        std::io::copy(stream, &mut hash)?;
+        Ok(Self::half(hash))
+    }
+
+    fn half(hash: Sha256) -> Self {
         let mut half = [0; 16];
         half.copy_from_slice(&hash.finalize()[..16]);
         Self(half)

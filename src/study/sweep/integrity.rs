@@ -1,6 +1,6 @@
 //! Evaluation of the integrity statements of a sweep: verdicts and error bounds against the true errors.
 
-use super::table::ColumnType;
+use super::table::{Column, ColumnType};
 use super::{Measure, Plan, Sweep};
 use crate::StudyError;
 use crate::integrity::large_error_m;
@@ -61,16 +61,15 @@ impl Sweep {
         if !measures.iter().all(|measure| self.plan.spec().measures.contains(measure)) {
             return Ok(None);
         }
-        let table = self.open_merged(&self.table())?;
-        let figures = |measure: Measure| {
-            let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
-            Ok(cells.into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect::<Vec<f64>>())
-        };
-        let figures: Vec<Vec<f64>> = measures.into_iter().map(figures).collect::<Result<_, StudyError>>()?;
-        let numbers = table.column("point", ColumnType::Counts)?.counts();
         let axes = text_axes(&self.plan);
-        let cells = |axis: &String| Ok(table.column(axis, ColumnType::Text)?.texts());
-        let texts: Vec<Vec<Option<String>>> = axes.iter().map(cells).collect::<Result<_, StudyError>>()?;
+        let mut columns = vec![("point", ColumnType::Counts)];
+        columns.extend(measures.iter().map(|measure| (measure.key(), ColumnType::Numbers)));
+        columns.extend(axes.iter().map(|axis| (axis.as_str(), ColumnType::Text)));
+        let mut columns = self.read_merged(&self.table(), &columns)?.into_iter();
+        let numbers = columns.next().map_or_else(Vec::new, Column::counts);
+        let filled = |column: Column| column.numbers().into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect();
+        let figures: Vec<Vec<f64>> = columns.by_ref().take(measures.len()).map(filled).collect();
+        let texts: Vec<Vec<Option<String>>> = columns.map(Column::texts).collect();
         let faults = axes.iter().position(|axis| axis == FAULT_AXIS.0);
         let run = |(row, number): (usize, Option<i64>)| {
             let settings: Vec<String> = texts.iter().map(|column| column[row].clone().unwrap_or_default()).collect();

@@ -102,7 +102,7 @@ pub enum Measure {
     /// shake. Above 1 the spring lasts as long.
     FatigueMargin,
     /// Computing time of the open loop on one thread over the length of the recording. Like the next two it is reported in
-    /// `times.parquet`, not in the table of results.
+    /// `times.csv`, not in the table of results.
     OpenLoopTimeRatio,
     /// The same of the loop closure.
     ClosedLoopTimeRatio,

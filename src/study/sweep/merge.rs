@@ -1,15 +1,15 @@
 //! Merges part files into one table, with the same bytes for any order and division of the work.
 
-use super::folder::{ROWS_PER_GROUP, Unit};
+use super::folder::Unit;
 use super::part::Part;
-use super::table::{Column, ColumnType, Table, TableWriter, quoted};
+use super::table::{Column, ColumnType, TableWriter, open, read_columns};
 use super::{Measure, Shard, Sweep};
 use crate::StudyError;
-use crate::atomic_file::AtomicFile;
+use crate::atomic_file::write_text;
 use serde::Serialize;
-use std::io::{BufWriter, Write};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim_base::spec::SpecError;
+use zsim_base::spec::{SpecError, split_unit};
 
 /// Progress of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -42,142 +42,113 @@ impl Sweep {
         Ok(counter.status())
     }
 
-    /// Writes `table.parquet`, `table.csv` and `times.parquet`: one row per finished run, in the order of the plan.
+    /// Writes `table.csv`, its schema `table.schema.json`, and `times.csv`: one row per finished run, in the order of the plan.
     ///
-    /// The two tables depend only on the plan and on the set of finished runs; computing times are in a file of their own.
-    /// At most one row group is in memory.
+    /// The table depends only on the plan and on the set of finished runs; computing times are in a file of their own. At
+    /// most one part is in memory.
     ///
     /// # Errors
     /// If a part cannot be opened, or if the tables cannot be written.
     pub fn merge(&self) -> Result<SweepStatus, StudyError> {
-        let mut tables = Tables::create(self)?;
+        let mut table = TableWriter::create(&self.temporary(), &self.table(), &self.table_columns())?;
+        let mut times = TableWriter::create(&self.temporary(), &self.times(), &self.time_columns())?;
         let mut counter = ProgressCounter::default();
-        let mut buffer = self.empty_buffer();
         for unit in &self.units {
             let part = self.read_part(unit)?;
             counter.add(unit, &part);
             let Part::Done { columns, .. } = part else { continue };
-            buffer.append(self, unit, columns);
-            if buffer.numbers.len() as u64 >= ROWS_PER_GROUP {
-                tables.write(self, std::mem::replace(&mut buffer, self.empty_buffer()))?;
-            }
+            let (results, computing) = self.rows(unit, columns);
+            table.write(&results)?;
+            times.write(&computing)?;
         }
-        if !buffer.numbers.is_empty() {
-            tables.write(self, buffer)?;
-        }
-        tables.finish()?;
+        times.finish()?;
+        write_text(&self.temporary(), &self.folder.join("table.schema.json"), &table_schema(&self.table_columns())?)?;
+        table.finish()?;
         Ok(counter.status())
+    }
+
+    /// Rows of a unit's runs in the two tables, from the columns of its part.
+    fn rows(&self, unit: &Unit, mut columns: Vec<Column>) -> (Vec<Column>, Vec<Column>) {
+        let numbers: Vec<u64> = (unit.first..unit.first + unit.count).collect();
+        let identity = |index: &u64| Some(self.identities[*index as usize].to_string());
+        let points = Column::Counts(numbers.iter().map(|index| Some(*index as i64)).collect());
+        // The computing times follow the errors.
+        let times = columns.split_off(self.plan.result_measures().len() + 1);
+        let mut results = vec![points.clone()];
+        results.extend(self.plan.setting_cells(&numbers));
+        results.append(&mut columns);
+        results.push(Column::Text(numbers.iter().map(identity).collect()));
+        (results, [points].into_iter().chain(times).collect())
     }
 
     /// Path of the table of results.
     pub(super) fn table(&self) -> PathBuf {
-        self.folder.join("table.parquet")
-    }
-
-    /// Opens a merged table.
-    ///
-    /// # Errors
-    /// If it does not exist, or if it is damaged.
-    pub(super) fn open_merged(&self, path: &Path) -> Result<Table, StudyError> {
-        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
-        Ok(Table::open(path)?.ok_or_else(unmerged)?)
+        self.folder.join("table.csv")
     }
 
     /// Path of the table of computing times.
     fn times(&self) -> PathBuf {
-        self.folder.join("times.parquet")
+        self.folder.join("times.csv")
     }
 
-    /// Path of the table that contains `measure`.
-    pub(super) fn table_of(&self, measure: Measure) -> PathBuf {
-        if measure.is_time() { self.times() } else { self.table() }
+    /// Reads columns of a merged table.
+    ///
+    /// # Errors
+    /// If it does not exist, or if it is damaged.
+    pub(super) fn read_merged(&self, path: &Path, columns: &[(&str, ColumnType)]) -> Result<Vec<Column>, StudyError> {
+        let unmerged = || SpecError::plain(path.display().to_string(), "does not exist: merge the sweep first");
+        read_columns(open(path)?.ok_or_else(unmerged)?, columns).map_err(StudyError::table(path))
+    }
+
+    /// Reads a measure of all rows of its merged table; `None` for a missing figure.
+    ///
+    /// # Errors
+    /// As [`read_merged`](Self::read_merged).
+    pub(super) fn read_measure(&self, measure: Measure) -> Result<Vec<Option<f64>>, StudyError> {
+        let path = if measure.is_time() { self.times() } else { self.table() };
+        let columns = self.read_merged(&path, &[(measure.key(), ColumnType::Numbers)])?;
+        Ok(columns.into_iter().flat_map(Column::numbers).collect())
     }
 
     fn table_columns(&self) -> Vec<(String, ColumnType)> {
         let mut columns = vec![("point".to_owned(), ColumnType::Counts)];
         columns.extend(self.plan.setting_columns());
-        columns.extend(
-            self.plan.result_measures().into_iter().map(|measure| (measure.key().to_owned(), ColumnType::Numbers)),
-        );
+        columns.extend(number_columns(&self.plan.result_measures()));
         columns.extend([("error".to_owned(), ColumnType::Text), ("id".to_owned(), ColumnType::Text)]);
         columns
     }
 
-    fn empty_buffer(&self) -> RowBuffer {
-        let figures = vec![Vec::new(); self.plan.result_measures().len()];
-        let times = vec![Vec::new(); self.plan.time_measures().len()];
-        RowBuffer { numbers: Vec::new(), figures, errors: Vec::new(), times }
+    fn time_columns(&self) -> Vec<(String, ColumnType)> {
+        let mut columns = vec![("point".to_owned(), ColumnType::Counts)];
+        columns.extend(number_columns(&self.plan.time_measures()));
+        columns
     }
 }
 
-/// Rows of the next row group.
-struct RowBuffer {
-    numbers: Vec<u64>,
-    figures: Vec<Vec<Option<f64>>>,
-    errors: Vec<Option<String>>,
-    times: Vec<Vec<Option<f64>>>,
+fn number_columns(measures: &[Measure]) -> impl Iterator<Item = (String, ColumnType)> {
+    measures.iter().map(|measure| (measure.key().to_owned(), ColumnType::Numbers))
 }
 
-impl RowBuffer {
-    fn append(&mut self, sweep: &Sweep, unit: &Unit, columns: Vec<Column>) {
-        self.numbers.extend(unit.first..unit.first + unit.count);
-        let measures = sweep.plan.result_measures().len();
-        for (k, column) in columns.into_iter().enumerate() {
-            match k {
-                k if k < measures => self.figures[k].extend(column.numbers()),
-                k if k == measures => self.errors.extend(column.texts()),
-                _ => self.times[k - measures - 1].extend(column.numbers()),
-            }
+/// Types and units of the columns as a Frictionless Table Schema (<https://datapackage.org/standard/table-schema/>).
+fn table_schema(columns: &[(String, ColumnType)]) -> Result<String, StudyError> {
+    let field = |(name, column_type): &(String, ColumnType)| {
+        let json_type = match column_type {
+            ColumnType::Counts => "integer",
+            ColumnType::Numbers => "number",
+            ColumnType::Text => "string",
+        };
+        let mut field = json!({ "name": name, "type": json_type });
+        if let Some(unit) = split_unit(name).1.filter(|_| *column_type == ColumnType::Numbers) {
+            field["unit"] = unit.into();
         }
-    }
-}
-
-/// Writers of the three files.
-struct Tables {
-    parquet: TableWriter,
-    csv: BufWriter<AtomicFile>,
-    times: TableWriter,
-}
-
-impl Tables {
-    fn create(sweep: &Sweep) -> Result<Self, StudyError> {
-        let (temporary, columns) = (sweep.temporary(), sweep.table_columns());
-        let parquet = TableWriter::create(&temporary, &sweep.table(), &columns)?;
-        let mut csv = BufWriter::new(AtomicFile::new(&temporary, &sweep.folder.join("table.csv"))?);
-        let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
-        writeln!(csv, "{}", names.join(",")).map_err(StudyError::file(csv.get_ref().target()))?;
-        let times = sweep.plan.time_measures().into_iter();
-        let times = times.map(|measure| (measure.key().to_owned(), ColumnType::Numbers));
-        let time_columns: Vec<_> = [("point".to_owned(), ColumnType::Counts)].into_iter().chain(times).collect();
-        let times = TableWriter::create(&temporary, &sweep.times(), &time_columns)?;
-        Ok(Self { parquet, csv, times })
-    }
-
-    fn write(&mut self, sweep: &Sweep, buffer: RowBuffer) -> Result<(), StudyError> {
-        let identity = |index: &u64| Some(sweep.identities[*index as usize].to_string());
-        let mut columns = vec![Column::Counts(buffer.numbers.iter().map(|index| Some(*index as i64)).collect())];
-        columns.extend(sweep.plan.setting_cells(&buffer.numbers));
-        columns.extend(buffer.figures.into_iter().map(Column::Numbers));
-        columns.push(Column::Text(buffer.errors));
-        columns.push(Column::Text(buffer.numbers.iter().map(identity).collect()));
-        self.parquet.write(&columns)?;
-        let times = buffer.times.into_iter().map(Column::Numbers);
-        self.times.write(&[columns[0].clone()].into_iter().chain(times).collect::<Vec<_>>())?;
-        for row in 0..buffer.numbers.len() {
-            let cells: Vec<String> = columns.iter().map(|column| column.cell(row)).collect();
-            let line = writeln!(self.csv, "{}", cells.join(","));
-            line.map_err(StudyError::file(self.csv.get_ref().target()))?;
+        if let Some(measure) = Measure::ALL.into_iter().find(|measure| measure.key() == name) {
+            field["description"] = measure.quantity().into();
         }
-        Ok(())
-    }
-
-    fn finish(self) -> Result<(), StudyError> {
-        self.parquet.finish()?;
-        self.times.finish()?;
-        let target = self.csv.get_ref().target().to_owned();
-        let flushed = self.csv.into_inner().map_err(std::io::IntoInnerError::into_error);
-        flushed.map_err(StudyError::file(&target))?.finish()
-    }
+        field
+    };
+    let fields: Vec<Value> = columns.iter().map(field).collect();
+    let schema = json!({ "fields": fields, "missingValues": [""], "primaryKey": ["point"] });
+    Ok(serde_json::to_string_pretty(&schema)? + "\n")
 }
 
 /// Counts finished, failed and missing runs.
@@ -218,5 +189,33 @@ impl ProgressCounter {
             damaged: self.damaged,
             thread_s_left: mean_s.map(|mean_s| mean_s * self.missing as f64),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_schema_has_the_type_and_the_unit_of_each_column() {
+        let columns = [
+            ("point", ColumnType::Counts),
+            ("material", ColumnType::Text),
+            ("head.wire_diameter_mm", ColumnType::Numbers),
+            ("drift_m_per_min", ColumnType::Numbers),
+        ];
+        let columns = columns.map(|(name, column_type)| (name.to_owned(), column_type));
+        let schema: Value = serde_json::from_str(&table_schema(&columns).unwrap()).unwrap();
+        let expected = json!({
+            "fields": [
+                { "name": "point", "type": "integer" },
+                { "name": "material", "type": "string" },
+                { "name": "head.wire_diameter_mm", "type": "number", "unit": "mm" },
+                { "name": "drift_m_per_min", "type": "number", "unit": "m/min", "description": "Drift" },
+            ],
+            "missingValues": [""],
+            "primaryKey": ["point"],
+        });
+        assert_eq!(schema, expected);
     }
 }

@@ -2,18 +2,17 @@
 
 use super::folder::Unit;
 use super::identity::ContentHash;
-use super::table::{Column, ColumnType, Table, TableWriter};
+use super::table::{Column, ColumnType, open, read_columns, to_csv};
 use super::{Measure, Sweep};
 use crate::StudyError;
-use parquet::errors::ParquetError;
+use crate::atomic_file::write_bytes;
 use serde::de::DeserializeOwned;
 use std::error::Error;
+use std::io::{Read, Seek, SeekFrom};
 use zsim_base::spec::{self, Source};
 
-/// Metadata keys of a part file: hash of its unit, checksum of its content, and details of its run.
-const UNIT: &str = "zsim.unit";
-const CHECKSUM: &str = "zsim.checksum";
-const DETAILS: &str = "zsim.details";
+/// Length of a checksum in the first line of a part file.
+const CHECKSUM_DIGITS: usize = 32;
 
 /// State of a unit's part file.
 #[derive(Debug, PartialEq)]
@@ -72,26 +71,22 @@ impl Sweep {
         let numbers = |measure: Measure| (measure.key().to_owned(), ColumnType::Numbers);
         let measures = self.plan.result_measures().into_iter().map(numbers);
         let times = self.plan.time_measures().into_iter().map(numbers);
-        measures.chain([("error".to_owned(), ColumnType::Text)]).chain(times).collect()
+        let text = |name: &str| [(name.to_owned(), ColumnType::Text)];
+        measures.chain(text("error")).chain(times).chain(text("details")).collect()
     }
 
-    /// Writes a unit's part file atomically.
+    /// Writes a unit's part file atomically: a line with the unit and the checksum of the rest, and a table.
     pub(super) fn write_part(&self, unit: &Unit, rows: &[RunOutcome]) -> Result<(), StudyError> {
-        let mut table = TableWriter::create(&self.temporary(), &self.part_path(unit), &self.part_columns())?;
         let (measures, times) = (self.plan.result_measures().len(), self.plan.time_measures().len());
         let cell = |figures: &[Option<f64>], k: usize| figures.get(k).copied().flatten().filter(|x| x.is_finite());
-        let figures = |k: usize| Column::Numbers(rows.iter().map(|row| cell(&row.figures, k)).collect());
-        let mut columns: Vec<Column> = (0..measures).map(figures).collect();
+        let mut columns: Vec<Column> =
+            (0..measures).map(|k| Column::Numbers(rows.iter().map(|row| cell(&row.figures, k)).collect())).collect();
         columns.push(Column::Text(rows.iter().map(|row| row.error.clone()).collect()));
         columns.extend((0..times).map(|k| Column::Numbers(rows.iter().map(|row| cell(&row.times, k)).collect())));
-        table.write(&columns)?;
-        table.set_metadata(UNIT, unit.identity.to_string());
-        let details = rows.iter().find_map(|row| row.details.as_deref());
-        table.set_metadata(CHECKSUM, checksum(&columns, rows.len(), details).to_string());
-        if let Some(details) = details {
-            table.set_metadata(DETAILS, details.to_owned());
-        }
-        table.finish()
+        columns.push(Column::Text(rows.iter().map(|row| row.details.clone()).collect()));
+        let path = self.part_path(unit);
+        let bytes = part_bytes(unit, &self.part_columns(), &columns).map_err(StudyError::file(&path))?;
+        write_bytes(&self.temporary(), &path, &bytes)
     }
 
     /// Reads a unit's part file.
@@ -99,39 +94,8 @@ impl Sweep {
     /// # Errors
     /// If the file exists and cannot be opened. A damaged file is not an error: its runs are repeated.
     pub(super) fn read_part(&self, unit: &Unit) -> Result<Part, StudyError> {
-        match self.read_content(unit) {
-            Err(StudyError::Table { .. }) => Ok(Part::Damaged),
-            read => read,
-        }
-    }
-
-    /// Content of a unit's part file.
-    ///
-    /// # Errors
-    /// [`StudyError::Table`] if the file is truncated, modified, or of another unit.
-    fn read_content(&self, unit: &Unit) -> Result<Part, StudyError> {
-        let path = self.part_path(unit);
-        let Some(table) = Table::open(&path)? else { return Ok(Part::Missing) };
-        let damaged = |what: &str| StudyError::table(&path)(ParquetError::General(what.to_owned()));
-        if table.metadata(UNIT) != Some(&unit.identity.to_string()) {
-            return Err(damaged("belongs to other runs of a sweep"));
-        }
-        if table.groups() != 1 || u64::try_from(table.rows()) != Ok(unit.count) {
-            return Err(damaged("has an unexpected number of rows"));
-        }
-        let columns = self.part_columns();
-        let columns: Vec<(&str, ColumnType)> =
-            columns.iter().map(|(name, column_type)| (name.as_str(), *column_type)).collect();
-        let columns = table.read(0, &columns)?;
-        let rows = unit.count as usize;
-        if columns.iter().any(|column| column.len() != rows) {
-            return Err(damaged("has columns of different lengths"));
-        }
-        let details = table.metadata(DETAILS);
-        if table.metadata(CHECKSUM) != Some(&checksum(&columns, rows, details).to_string()) {
-            return Err(damaged("checksum mismatch"));
-        }
-        Ok(Part::Done { details: details.map(str::to_owned), columns })
+        let Some(file) = open(&self.part_path(unit))? else { return Ok(Part::Missing) };
+        Ok(read_intact(file, unit, &self.part_columns()).unwrap_or(Part::Damaged))
     }
 
     /// Details of all runs in the order of the plan; `None` if a run failed, is missing, or has no details.
@@ -162,8 +126,99 @@ impl Sweep {
     }
 }
 
-/// Hash of all cells as CSV text, and of the details.
-fn checksum(columns: &[Column], rows: usize, details: Option<&str>) -> ContentHash {
-    let cells: Vec<String> = columns.iter().flat_map(|column| (0..rows).map(move |row| column.cell(row))).collect();
-    ContentHash::of(cells.iter().map(String::as_bytes).chain(details.map(str::as_bytes)))
+/// First line of a unit's part file, up to the checksum.
+fn first_words(unit: &Unit) -> String {
+    format!("zsim part 1, runs {}, checksum ", unit.identity)
+}
+
+/// Content of a unit's part file.
+fn part_bytes(unit: &Unit, columns: &[(String, ColumnType)], cells: &[Column]) -> std::io::Result<Vec<u8>> {
+    let table = to_csv(columns, cells)?;
+    let checksum = ContentHash::of_stream(&mut table.as_slice())?;
+    Ok([format!("{}{checksum}\n", first_words(unit)).as_bytes(), &table].concat())
+}
+
+/// Reads a unit's part file; `None` if it is truncated, modified, or of another unit.
+///
+/// The checksum is compared before the table is read, so that no other file is kept in memory.
+fn read_intact(mut file: impl Read + Seek, unit: &Unit, columns: &[(String, ColumnType)]) -> Option<Part> {
+    let start = first_words(unit);
+    let mut line = vec![0; start.len() + CHECKSUM_DIGITS + 1];
+    file.read_exact(&mut line).ok()?;
+    let checksum = line.strip_prefix(start.as_bytes())?;
+    if checksum != format!("{}\n", ContentHash::of_stream(&mut file).ok()?).as_bytes() {
+        return None;
+    }
+    file.seek(SeekFrom::Start(line.len() as u64)).ok()?;
+    let mut columns = read_columns(file, columns).ok()?;
+    let details = columns.pop()?.texts();
+    let is_complete = details.len() as u64 == unit.count;
+    is_complete.then(|| Part::Done { columns, details: details.into_iter().flatten().next() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    fn columns() -> Vec<(String, ColumnType)> {
+        let of = |(name, column_type): (&str, ColumnType)| (name.to_owned(), column_type);
+        [("sag_mm", ColumnType::Numbers), ("error", ColumnType::Text), ("details", ColumnType::Text)].map(of).to_vec()
+    }
+
+    fn unit(name: &str, count: u64) -> Unit {
+        Unit { identity: ContentHash::of([name.as_bytes()]), first: 0, count }
+    }
+
+    fn read(bytes: &[u8], unit: &Unit) -> Option<Part> {
+        read_intact(Cursor::new(bytes), unit, &columns())
+    }
+
+    /// A part with this table under a valid checksum.
+    fn with_table(unit: &Unit, table: &str) -> Vec<u8> {
+        let checksum = ContentHash::of_stream(&mut table.as_bytes()).unwrap();
+        format!("{}{checksum}\n{table}", first_words(unit)).into_bytes()
+    }
+
+    #[test]
+    fn a_part_is_read_back_and_damage_of_any_byte_is_found() {
+        let unit = unit("a", 2);
+        let figures = Column::Numbers(vec![Some(0.1 + 0.2), None]);
+        let errors = Column::Text(vec![None, Some("no \"spring\", \u{e4}".to_owned())]);
+        let details = "(\n    map: \"a,\",\r\n)\n";
+        let all = [figures.clone(), errors.clone(), Column::Text(vec![Some(details.to_owned()), None])];
+        let bytes = part_bytes(&unit, &columns(), &all).unwrap();
+        let whole = Part::Done { columns: vec![figures, errors], details: Some(details.to_owned()) };
+        assert_eq!(read(&bytes, &unit), Some(whole));
+        for at in 0..bytes.len() {
+            assert_eq!(read(&bytes[..at], &unit), None, "truncated to {at} bytes");
+            for bit in 0..8 {
+                let mut flipped = bytes.clone();
+                flipped[at] ^= 1 << bit;
+                assert_eq!(read(&flipped, &unit), None, "bit {bit} of byte {at}");
+            }
+        }
+        assert_eq!(read(&[bytes.as_slice(), b"\n"].concat(), &unit), None);
+        assert_eq!(read(&bytes, &super::tests::unit("b", 2)), None, "a part of another unit");
+        assert_eq!(read(&bytes, &Unit { count: 3, ..unit }), None);
+    }
+
+    #[test]
+    fn foreign_files_and_invalid_cells_are_damage() {
+        let unit = unit("a", 1);
+        assert!(read(&with_table(&unit, "sag_mm,error,details\n1.5,,\n"), &unit).is_some());
+        for table in [
+            "",
+            "sag_mm,error,details\n",
+            "sag_mm,error\n1.5,\n",
+            "sag_mm,error,details\nNaN,,\n",
+            "sag_mm,error,details\n-inf,,\n",
+            "sag_mm,error,details\n1.5,,\n1.5,,\n",
+            "sag_mm,error,details\n1.5,\n",
+            "\0\u{1}\u{2}",
+        ] {
+            assert_eq!(read(&with_table(&unit, table), &unit), None, "{table:?}");
+        }
+        assert_eq!(read(&[0xff; 4096], &unit), None);
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::axis::Levels;
 use super::design::AxisPosition;
-use super::table::ColumnType;
+use super::table::{Column, ColumnType};
 use super::{Measure, Plan, Sweep};
 use crate::StudyError;
 
@@ -22,10 +22,14 @@ pub(super) struct Runs {
 impl Runs {
     /// Reads the runs of a merged sweep.
     pub fn read(sweep: &Sweep) -> Result<Self, StudyError> {
-        let table = sweep.open_merged(&sweep.table())?;
-        let numbers = table.column("point", ColumnType::Counts)?.counts();
+        let axes = sweep.plan.axes();
+        let mut columns = vec![("point", ColumnType::Counts)];
+        columns
+            .extend(axes.iter().filter(|axis| axis.is_number()).map(|axis| (axis.name.as_str(), ColumnType::Numbers)));
+        let mut columns = sweep.read_merged(&sweep.table(), &columns)?.into_iter();
+        let numbers = columns.next().map_or_else(Vec::new, Column::counts);
         let numbers: Vec<u64> = numbers.into_iter().flatten().map(|number| number as u64).collect();
-        let mut levels = vec![Vec::with_capacity(numbers.len()); sweep.plan.axes().len()];
+        let mut levels = vec![Vec::with_capacity(numbers.len()); axes.len()];
         for number in &numbers {
             for (levels, position) in levels.iter_mut().zip(sweep.plan.positions(*number)) {
                 levels.push(match position {
@@ -34,11 +38,8 @@ impl Runs {
                 });
             }
         }
-        let settings = sweep.plan.axes().iter().map(|axis| {
-            let cells = axis.is_number().then(|| table.column(&axis.name, ColumnType::Numbers)).transpose()?;
-            Ok(cells.map(|cells| cells.numbers().into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect()))
-        });
-        let settings = settings.collect::<Result<_, StudyError>>()?;
+        let filled = |column: Column| column.numbers().into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect();
+        let settings = axes.iter().map(|axis| axis.is_number().then(|| columns.next().map(filled)).flatten()).collect();
         Ok(Self { numbers, levels, settings })
     }
 
@@ -54,11 +55,10 @@ impl Sweep {
     /// # Errors
     /// If the sweep is not merged.
     pub(crate) fn values_at(&self, level: &str, measure: Measure) -> Result<Vec<Option<f64>>, StudyError> {
-        let table = self.open_merged(&self.table())?;
         let Some(axis) = self.plan.axes().first() else { return Ok(Vec::new()) };
-        let levels = table.column(&axis.name, ColumnType::Text)?.texts();
-        let values = self.open_merged(&self.table_of(measure))?.column(measure.key(), ColumnType::Numbers)?.numbers();
-        let at_level = levels.into_iter().zip(values).filter(|(of, _)| of.as_deref() == Some(level));
+        let levels = self.read_merged(&self.table(), &[(&axis.name, ColumnType::Text)])?;
+        let levels = levels.into_iter().flat_map(Column::texts);
+        let at_level = levels.zip(self.read_measure(measure)?).filter(|(of, _)| of.as_deref() == Some(level));
         Ok(at_level.map(|(_, value)| value).collect())
     }
 }

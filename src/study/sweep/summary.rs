@@ -2,7 +2,6 @@
 
 use super::paired::{holm, signed_rank_p};
 use super::runs::{Runs, level_count, level_label};
-use super::table::ColumnType;
 use super::trend::rank_correlation;
 use super::{Measure, Plan, Sampling, Sweep};
 use crate::StudyError;
@@ -149,8 +148,7 @@ impl Sweep {
 
     /// A measure of all rows of the merged table; missing figures are [`Measure::missing_value`].
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
-        let table = self.open_merged(&self.table_of(measure))?;
-        let cells = table.column(measure.key(), ColumnType::Numbers)?.numbers();
+        let cells = self.read_measure(measure)?;
         Ok(cells.into_iter().map(|cell| cell.unwrap_or(measure.missing_value())).collect())
     }
 }
