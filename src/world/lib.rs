@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use zsim_base::geometry::Vector;
-//! use crate::{Ray, World};
+//! use zsim_world::{Ray, World};
 //!
 //! let office = World::load("office")?;
 //! let route = office.default_route().ok_or("no route")?;

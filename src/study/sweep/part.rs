@@ -199,7 +199,7 @@ mod tests {
             }
         }
         assert_eq!(read(&[bytes.as_slice(), b"\n"].concat(), &unit), None);
-        assert_eq!(read(&bytes, &super::tests::unit("b", 2)), None, "a part of another unit");
+        assert_eq!(read(&bytes, &self::unit("b", 2)), None, "a part of another unit");
         assert_eq!(read(&bytes, &Unit { count: 3, ..unit }), None);
     }
 
