@@ -65,13 +65,12 @@ const BELOW_CLI: &[&str] = &[
 ];
 
 /// Crates that are restricted to some rooms, and these rooms.
-const RESTRICTED_CRATES: [(&str, &[&str]); 22] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 21] = [
     ("anyhow", &["cli"]),
     ("base64", &["report"]),
     ("cdr", &["recording"]),
     ("clap", &["cli"]),
     ("clap_mangen", &["cli"]),
-    ("cmaes", &["study"]),
     ("csv", &["study"]),
     ("http-body-util", &["cli"]),
     ("hyper", &["cli"]),

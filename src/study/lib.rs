@@ -18,6 +18,7 @@ mod calibration;
 mod closed_loop;
 mod cloud;
 mod cloud_files;
+mod cma_es;
 mod comparison;
 pub mod coverage;
 mod decimation;

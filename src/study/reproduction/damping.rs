@@ -2,8 +2,8 @@
 
 use super::PeaksSpec;
 use crate::StudyError;
+use crate::cma_es::CmaEs;
 use crate::gains::{AXES, with_damping};
-use cmaes::{CMAESOptions, DVector};
 use serde::{Deserialize, Serialize};
 use zsim_base::random::Seed;
 use zsim_base::spec::Source;
@@ -98,17 +98,13 @@ pub fn fit_damping(
     };
     // Static equilibrium does not depend on damping: later evaluations cannot fail.
     let at_start = fit_at(&start)?;
-    let objective = |point: &DVector<f64>| {
+    let objective = |point: &[f64]| {
         let outside: f64 = point.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
         let deviation = point.iter().zip(start).map(|(x, own)| ((x - own) * (high - low)).powi(2)).sum::<f64>();
-        let misfit = fit_at(point.as_slice()).map_or(1e3, |fit| fit.rms_log_ratio().unwrap_or(0.0));
+        let misfit = fit_at(point).map_or(1e3, |fit| fit.rms_log_ratio().unwrap_or(0.0));
         misfit * misfit + outside + PRIOR_WEIGHT * PRIOR_WEIGHT * deviation
     };
-    let options = CMAESOptions::new(start.to_vec(), 0.2)
-        .population_size(POPULATION)
-        .max_function_evals(MAX_EVALUATIONS)
-        .seed(Seed(1).child("reproduction/damping").0);
-    // The options are valid: a positive step size and a population of ten.
-    let best = options.build(objective).ok().and_then(|mut optimiser| optimiser.run().overall_best);
-    best.map_or(Ok(at_start), |best| fit_at(best.point.as_slice()))
+    let settings = CmaEs { step: 0.2, population: POPULATION, max_evaluations: MAX_EVALUATIONS };
+    let best = settings.minimise(&start, &mut Seed(1).stream("reproduction/damping"), objective);
+    best.map_or(Ok(at_start), |best| fit_at(&best.point))
 }

@@ -2,7 +2,7 @@
 //!
 //! The design space is the geometry of a coil within bounds, or a catalogue of springs. A design is evaluated in closed
 //! form, in less than 1 ms. A catalogue is evaluated exhaustively. A geometry is sampled uniformly first; then several
-//! runs of CMA-ES (Hansen 2016, crate `cmaes`) minimise the goals with different weights. The scalarisation is that of
+//! runs of CMA-ES (Hansen 2016) minimise the goals with different weights. The scalarisation is that of
 //! Chebyshev, which also finds concave fronts. The Pareto set is taken from all evaluated designs; an evenly distributed
 //! selection of it is verified by full simulations. Designs that cannot be made, clash or break are rejected.
 //!

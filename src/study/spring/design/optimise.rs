@@ -1,7 +1,7 @@
 //! Optimisation of a design: CMA-ES on a scalar cost.
 
 use super::evaluation::Evaluation;
-use cmaes::{CMAESOptions, DVector};
+use crate::cma_es::CmaEs;
 use rand::RngExt;
 use zsim_base::random::Stream;
 
@@ -9,31 +9,20 @@ use zsim_base::random::Stream;
 pub(super) fn optimise(
     start: &[f64; 4],
     evaluations: usize,
-    seed: u64,
+    stream: &mut Stream,
     evaluate: &dyn Fn(&[f64]) -> Evaluation,
     cost: &dyn Fn(&Evaluation) -> f64,
 ) -> Vec<Evaluation> {
     let mut evaluated = Vec::with_capacity(evaluations);
-    let population = 8;
-    if evaluations < population {
-        return evaluated;
-    }
-    let objective = |point: &DVector<f64>| {
+    let settings = CmaEs { step: 0.15, population: 8, max_evaluations: evaluations };
+    let _ = settings.minimise(start, stream, |point| {
         let outside: f64 = point.iter().map(|x| (x - x.clamp(0.0, 1.0)).powi(2)).sum();
         let inside: Vec<f64> = point.iter().map(|x| x.clamp(0.0, 1.0)).collect();
         let evaluation = evaluate(&inside);
         let value = cost(&evaluation) + outside;
         evaluated.push(evaluation);
         value
-    };
-    let options = CMAESOptions::new(start.to_vec(), 0.15)
-        .population_size(population)
-        .max_function_evals(evaluations - population + 1)
-        .seed(seed);
-    // These options are always valid: positive step size, population of 8.
-    if let Ok(mut optimiser) = options.build(objective) {
-        optimiser.run();
-    }
+    });
     evaluated
 }
 

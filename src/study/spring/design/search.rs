@@ -165,8 +165,8 @@ impl DesignSearch {
             let cost = |evaluation: &Evaluation| scales.cost(evaluation, &weights);
             let start = (0..samples).min_by(|a, b| cost(&sampled[*a]).total_cmp(&cost(&sampled[*b])));
             let start = start.map_or([0.5; 4], |k| points[k]);
-            let seed = seed.child(&format!("design/{k}")).0;
-            optimise(&start, evaluations_per_run, seed, &evaluate, &cost)
+            let mut stream = seed.part("design/optimiser", k as u64);
+            optimise(&start, evaluations_per_run, &mut stream, &evaluate, &cost)
         });
         let optimised: Vec<Vec<Evaluation>> = runs.collect();
         sampled.into_iter().chain(optimised.into_iter().flatten()).collect()
