@@ -65,28 +65,26 @@ const BELOW_CLI: &[&str] = &[
 ];
 
 /// Crates that are restricted to some rooms, and these rooms.
-const RESTRICTED_CRATES: [(&str, &[&str]); 21] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 19] = [
     ("anyhow", &["cli"]),
     ("base64", &["report"]),
     ("cdr", &["recording"]),
     ("clap", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("csv", &["study"]),
-    ("http-body-util", &["cli"]),
-    ("hyper", &["cli"]),
-    ("hyper-util", &["cli"]),
+    ("httparse", &["cli"]),
     ("include_dir", &["base"]),
     ("indicatif", &["cli"]),
     ("las", &["recording"]),
     ("mcap", &["recording", "cli"]),
     ("parry3d", &["world"]),
     ("plotters", &["report"]),
+    ("png", &["report"]),
     ("rapier3d-f64", &["dynamics"]),
     ("rustix", &["study"]),
     ("sha2", &["study"]),
     ("signal-hook", &["cli"]),
     ("sobol", &["study"]),
-    ("tokio", &["cli"]),
 ];
 
 /// Crates of the Python package: the library, and what converts its values.

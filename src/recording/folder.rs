@@ -1,6 +1,7 @@
 //! Files of a recording that is a folder, as rosbag2 writes them.
 
 use crate::RecordingError;
+use crate::yaml::parse_yaml;
 use serde::Deserialize;
 use std::ffi::OsStr;
 use std::io::{Error, Read};
@@ -78,8 +79,7 @@ fn files_in_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     if text.trim().is_empty() {
         return Ok(Vec::new());
     }
-    let parsed: Metadata =
-        serde_saphyr::from_str(&text).map_err(|error| metadata_error(error.without_snippet().to_string()))?;
+    let parsed: Metadata = parse_yaml(&text).map_err(|error| metadata_error(error.to_string()))?;
     let names =
         parsed.rosbag2_bagfile_information.map(|information| information.relative_file_paths).unwrap_or_default();
     names.iter().map(|name| find_listed_file(path, name)).collect()

@@ -58,6 +58,7 @@ mod truth;
 mod tum;
 mod wire;
 mod writer;
+mod yaml;
 
 pub use base_imu::BaseImuRecord;
 pub use cloud::CloudPoint;
@@ -81,3 +82,4 @@ pub use selection::{Selection, TopicPreference};
 pub use truth::{Truth, TruthReader};
 pub use tum::{TumWriter, parse_tum, read_tum, write_tum};
 pub use writer::{BaseImuDescription, RunDescription, Writer};
+pub use yaml::{YamlError, parse_yaml};

@@ -9,6 +9,7 @@ use serde::de::IgnoredAny;
 use std::path::Path;
 use zsim_base::geometry::{Pose, Rotation};
 use zsim_dynamics::PlacementSpec;
+use zsim_recording::parse_yaml;
 
 /// Maximum deviation of a matrix element from a rigid transform: manually written files have 3 or 4 digits.
 const RIGID_TOLERANCE: f64 = 1e-3;
@@ -96,7 +97,7 @@ impl CalibrationSpec {
     /// When the file has an unknown key or an invalid value, or neither noise nor a transform.
     pub fn from_kalibr(text: &str, name: &str) -> Result<Self, StudyError> {
         let invalid = |problem: String| StudyError::Calibration { name: name.to_owned(), problem };
-        let file: File = serde_saphyr::from_str(text).map_err(|error| invalid(error.without_snippet().to_string()))?;
+        let file: File = parse_yaml(text).map_err(|error| invalid(error.to_string()))?;
         let transform = file.transform().map_err(invalid)?;
         let imu = file.noise(name)?;
         if transform.is_none() && imu.is_none() {

@@ -1,40 +1,43 @@
-//! The HTTP server of the live page: on the loopback, on one thread of its own.
+//! The HTTP server of the live page: on the loopback, with one thread for each connection.
 //!
 //! A page asks for an update with what it has; the answer waits until there is something new. The server keeps nothing
-//! for each page, so that pages can come and go.
+//! for each page, so that pages can come and go. A connection is closed after one answer.
 
 use super::request::UpdateRequest;
 use super::shared::Shared;
-use http_body_util::Full;
-use hyper::body::{Bytes, Incoming};
-use hyper::header::{
-    CACHE_CONTROL, CONTENT_TYPE, HOST, HeaderName, HeaderValue, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
-};
-use hyper::server::conn::http1;
-use hyper::service::service_fn;
-use hyper::{Method, Request, Response, StatusCode};
-use hyper_util::rt::{TokioIo, TokioTimer};
-use std::convert::Infallible;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::io::{Error, ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
-use std::time::Duration;
-use tokio::sync::Semaphore;
-use tokio::time::{Instant, sleep, timeout_at};
+use std::thread::{Builder, sleep};
+use std::time::{Duration, Instant};
 
 /// Maximum number of connections; a browser opens up to six.
 const MAX_CONNECTIONS: usize = 64;
+/// Maximum length of the head of a request, bytes, and maximum number of its header fields.
+const MAX_HEAD_BYTES: usize = 16 << 10;
+const MAX_FIELDS: usize = 64;
 /// Time for the head of a request.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
+/// Time that a page may take to receive some of an answer.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// An answer without news is sent after this time.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
-/// Waiting time after a connection could not be accepted, for example because there are too many open files.
+/// Waiting time while there are too many connections or open files.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
-/// Pages of other sites must not embed the answers.
-const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
+/// Header fields of all answers: pages of other sites must not embed them.
+const FIELDS: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n\
+                      X-Frame-Options: DENY\r\nCross-Origin-Resource-Policy: same-origin\r\n";
 
 const HTML: &str = "text/html; charset=utf-8";
 const JSON: &str = "application/json";
 const TEXT: &str = "text/plain; charset=utf-8";
+
+const OK: &str = "200 OK";
+const BAD_REQUEST: &str = "400 Bad Request";
+const FORBIDDEN: &str = "403 Forbidden";
+const NOT_FOUND: &str = "404 Not Found";
+const METHOD_NOT_ALLOWED: &str = "405 Method Not Allowed";
+const INTERNAL_SERVER_ERROR: &str = "500 Internal Server Error";
 
 /// Opens `port` on 127.0.0.1, or a free one if it is 0, and serves pages until the process ends.
 ///
@@ -42,108 +45,148 @@ const TEXT: &str = "text/plain; charset=utf-8";
 /// When the port cannot be opened or the thread cannot be started.
 pub(super) fn start(port: u16, shared: Arc<Shared>) -> std::io::Result<SocketAddr> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
-    listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
-    let serve = move || runtime.block_on(serve(listener, address, shared));
-    std::thread::Builder::new().name("live".to_owned()).spawn(serve)?;
+    Builder::new().name("live".to_owned()).spawn(move || serve(&listener, address, &shared))?;
     Ok(address)
 }
 
-/// Serves each connection in a task of its own.
-async fn serve(listener: TcpListener, address: SocketAddr, shared: Arc<Shared>) {
-    let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
-    let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+/// Serves each connection in a thread of its own.
+fn serve(listener: &TcpListener, address: SocketAddr, shared: &Arc<Shared>) {
+    // Each connection has a clone, so that the number of references is the number of connections and one.
+    let connections = Arc::new(());
     loop {
-        let Ok(permit) = connections.clone().acquire_owned().await else { return };
-        let Ok((stream, _)) = listener.accept().await else {
-            sleep(ACCEPT_PAUSE).await;
+        let accepted = (Arc::strong_count(&connections) <= MAX_CONNECTIONS).then(|| listener.accept());
+        let Some(Ok((stream, _))) = accepted else {
+            sleep(ACCEPT_PAUSE);
             continue;
         };
-        let shared = shared.clone();
-        tokio::spawn(async move {
-            let answer = service_fn(move |request| answer(request, address, shared.clone()));
-            let mut connection = http1::Builder::new();
-            connection.timer(TokioTimer::new()).header_read_timeout(HEAD_TIMEOUT);
+        let (connection, shared) = (connections.clone(), shared.clone());
+        let answer = move || {
             // A browser may close its connection at any time.
-            let _ = connection.serve_connection(TokioIo::new(stream), answer).await;
-            drop(permit);
-        });
+            let _ = answer_request(stream, address, &shared);
+            drop(connection);
+        };
+        // Without a thread the connection is closed.
+        let _ = Builder::new().name("live page".to_owned()).spawn(answer);
     }
 }
 
-async fn answer(
-    request: Request<Incoming>,
-    address: SocketAddr,
-    shared: Arc<Shared>,
-) -> Result<Response<Full<Bytes>>, Infallible> {
-    if !is_for(&request, address) {
-        let sentence = format!("the host must be {address} or localhost:{}", address.port());
-        return Ok(response(StatusCode::FORBIDDEN, TEXT, sentence));
-    }
-    if request.method() != Method::GET {
-        return Ok(response(StatusCode::METHOD_NOT_ALLOWED, TEXT, "only GET is possible"));
-    }
-    Ok(match request.uri().path() {
-        "/" => response(StatusCode::OK, HTML, shared.page.clone()),
-        "/updates" => updates(request.uri().query().unwrap_or_default(), &shared).await,
-        "/report.html" => report(&shared),
-        _ => response(StatusCode::NOT_FOUND, TEXT, "not found"),
-    })
+fn answer_request(mut stream: TcpStream, address: SocketAddr, shared: &Shared) -> std::io::Result<()> {
+    let answer = match Head::read(&mut stream)? {
+        Some(head) => head.answer(address, shared),
+        None => Answer::new(BAD_REQUEST, TEXT, "the request is not valid, or its head is too long"),
+    };
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+    let Answer { status, content, body } = answer;
+    write!(stream, "HTTP/1.1 {status}\r\nContent-Type: {content}\r\nContent-Length: {}\r\n{FIELDS}\r\n", body.len())?;
+    stream.write_all(&body)
 }
 
-/// Whether a request names this server. A page of another site could reach it under the other site's name, if that name
-/// is changed to the loopback's address (DNS rebinding).
-fn is_for(request: &Request<Incoming>, address: SocketAddr) -> bool {
-    let host = request.headers().get(HOST).and_then(|host| host.to_str().ok());
-    host.is_some_and(|host| host == address.to_string() || host == format!("localhost:{}", address.port()))
+/// The head of a request.
+struct Head {
+    method: String,
+    path: String,
+    query: String,
+    host: Vec<u8>,
+}
+
+impl Head {
+    /// Reads a head; `None` if it is not valid or too long.
+    fn read(stream: &mut TcpStream) -> std::io::Result<Option<Self>> {
+        let end = Instant::now() + HEAD_TIMEOUT;
+        let (mut bytes, mut chunk) = (Vec::new(), [0; 4096]);
+        while bytes.len() < MAX_HEAD_BYTES {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(Error::from(ErrorKind::TimedOut));
+            }
+            stream.set_read_timeout(Some(left))?;
+            match stream.read(&mut chunk)? {
+                0 => return Err(Error::from(ErrorKind::UnexpectedEof)),
+                count => bytes.extend_from_slice(&chunk[..count]),
+            }
+            let mut fields = [httparse::EMPTY_HEADER; MAX_FIELDS];
+            let mut request = httparse::Request::new(&mut fields);
+            match request.parse(&bytes) {
+                Ok(httparse::Status::Partial) => {}
+                Ok(httparse::Status::Complete(_)) => return Ok(Self::of(&request)),
+                Err(_) => return Ok(None),
+            }
+        }
+        Ok(None)
+    }
+
+    fn of(request: &httparse::Request<'_, '_>) -> Option<Self> {
+        let (path, query) = request.path?.split_once('?').unwrap_or((request.path?, ""));
+        let host = request.headers.iter().find(|field| field.name.eq_ignore_ascii_case("host"));
+        Some(Self {
+            method: request.method?.to_owned(),
+            path: path.to_owned(),
+            query: query.to_owned(),
+            host: host.map_or(Vec::new(), |field| field.value.to_vec()),
+        })
+    }
+
+    fn answer(&self, address: SocketAddr, shared: &Shared) -> Answer {
+        if !self.is_for(address) {
+            let sentence = format!("the host must be {address} or localhost:{}", address.port());
+            return Answer::new(FORBIDDEN, TEXT, sentence);
+        }
+        if self.method != "GET" {
+            return Answer::new(METHOD_NOT_ALLOWED, TEXT, "only GET is possible");
+        }
+        match self.path.as_str() {
+            "/" => Answer::new(OK, HTML, shared.page.as_str()),
+            "/updates" => updates(&self.query, shared),
+            "/report.html" => report(shared),
+            _ => Answer::new(NOT_FOUND, TEXT, "not found"),
+        }
+    }
+
+    /// Whether the request names this server. A page of another site could reach it under the other site's name, if that
+    /// name is changed to the loopback's address (DNS rebinding).
+    fn is_for(&self, address: SocketAddr) -> bool {
+        let names = [address.to_string(), format!("localhost:{}", address.port())];
+        names.iter().any(|name| name.as_bytes() == self.host)
+    }
+}
+
+/// An answer to a request.
+struct Answer {
+    status: &'static str,
+    content: &'static str,
+    body: Vec<u8>,
+}
+
+impl Answer {
+    fn new(status: &'static str, content: &'static str, body: impl Into<Vec<u8>>) -> Self {
+        Self { status, content, body: body.into() }
+    }
 }
 
 /// Answers with what the page lacks, as soon as it lacks something.
-async fn updates(query: &str, shared: &Shared) -> Response<Full<Bytes>> {
+fn updates(query: &str, shared: &Shared) -> Answer {
     let Some(request) = UpdateRequest::of_query(query) else {
-        return response(StatusCode::BAD_REQUEST, TEXT, "the query is not that of a page");
+        return Answer::new(BAD_REQUEST, TEXT, "the query is not that of a page");
     };
     if request.leaves {
         shared.viewers().leave(request.viewer);
-        return response(StatusCode::OK, JSON, "null");
+        return Answer::new(OK, JSON, "null");
     }
     shared.viewers().see(request.viewer);
-    let mut changes = shared.changes();
-    let until = Instant::now() + LONGEST_WAIT;
-    let mut wants_news = true;
-    let update = loop {
-        if let Some(update) = shared.update(&request.page, wants_news) {
-            break update;
-        }
-        wants_news = timeout_at(until, changes.changed()).await.is_ok();
-    };
+    let update = shared.update(&request.page, LONGEST_WAIT);
     shared.viewers().see(request.viewer);
     match update {
-        Ok(json) => response(StatusCode::OK, JSON, json),
-        Err(error) => response(StatusCode::INTERNAL_SERVER_ERROR, TEXT, error.to_string()),
+        Ok(json) => Answer::new(OK, JSON, json),
+        Err(error) => Answer::new(INTERNAL_SERVER_ERROR, TEXT, error.to_string()),
     }
 }
 
 /// The report, when it is complete.
-fn report(shared: &Shared) -> Response<Full<Bytes>> {
+fn report(shared: &Shared) -> Answer {
     match shared.report().map(std::fs::read) {
-        None => response(StatusCode::NOT_FOUND, TEXT, "there is no report yet"),
-        Some(Ok(html)) => response(StatusCode::OK, HTML, html),
-        Some(Err(error)) => response(StatusCode::INTERNAL_SERVER_ERROR, TEXT, error.to_string()),
+        None => Answer::new(NOT_FOUND, TEXT, "there is no report yet"),
+        Some(Ok(html)) => Answer::new(OK, HTML, html),
+        Some(Err(error)) => Answer::new(INTERNAL_SERVER_ERROR, TEXT, error.to_string()),
     }
-}
-
-fn response(status: StatusCode, content: &'static str, body: impl Into<Bytes>) -> Response<Full<Bytes>> {
-    let mut response = Response::new(Full::new(body.into()));
-    *response.status_mut() = status;
-    let headers = [
-        (CONTENT_TYPE, content),
-        (CACHE_CONTROL, "no-store"),
-        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (X_FRAME_OPTIONS, "DENY"),
-        (RESOURCE_POLICY, "same-origin"),
-    ];
-    response.headers_mut().extend(headers.map(|(name, value)| (name, HeaderValue::from_static(value))));
-    response
 }

@@ -3,8 +3,8 @@
 use super::run::{LiveRun, PageState};
 use super::viewers::Viewers;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use tokio::sync::watch;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 use zsim_report::page::{LiveEnd, LiveVerdict};
 
 /// State of a run and of its pages.
@@ -15,20 +15,25 @@ pub(super) struct Shared {
     viewers: Mutex<Viewers>,
     /// The file of the report; `None` until it is complete.
     report: Mutex<Option<PathBuf>>,
-    /// Notifies the server of each change of `run`.
-    changes: watch::Sender<()>,
+    /// Notifies the connections of each change of `run`.
+    changed: Condvar,
 }
 
 impl Shared {
     pub(super) fn new(page: String, run: LiveRun) -> Self {
-        let (changes, _) = watch::channel(());
-        Self { page, run: Mutex::new(run), viewers: Mutex::default(), report: Mutex::new(None), changes }
+        Self {
+            page,
+            run: Mutex::new(run),
+            viewers: Mutex::default(),
+            report: Mutex::new(None),
+            changed: Condvar::new(),
+        }
     }
 
-    /// Changes the state of the run, and notifies the server.
+    /// Changes the state of the run, and notifies the connections.
     pub(super) fn change(&self, change: impl FnOnce(&mut LiveRun)) {
         change(&mut lock(&self.run));
-        self.changes.send_replace(());
+        self.changed.notify_all();
     }
 
     /// Ends the run with its report, if there is one.
@@ -37,15 +42,12 @@ impl Shared {
         self.change(|run| run.end(end, verdict));
     }
 
-    /// A receiver of the changes from now on.
-    pub(super) fn changes(&self) -> watch::Receiver<()> {
-        self.changes.subscribe()
-    }
-
-    /// What a page lacks, as JSON; `None` if it lacks nothing and `wants_news`.
-    pub(super) fn update(&self, page: &PageState, wants_news: bool) -> Option<Result<String, serde_json::Error>> {
-        let run = lock(&self.run);
-        (!wants_news || run.is_newer_than(page) || run.has_ended()).then(|| run.update(page))
+    /// What a page lacks, as JSON, as soon as it lacks something or the run has ended, but after `longest_wait` at the latest.
+    pub(super) fn update(&self, page: &PageState, longest_wait: Duration) -> Result<String, serde_json::Error> {
+        let has_no_news = |run: &mut LiveRun| !run.is_newer_than(page) && !run.has_ended();
+        let waited = self.changed.wait_timeout_while(lock(&self.run), longest_wait, has_no_news);
+        let (run, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        run.update(page)
     }
 
     pub(super) fn report(&self) -> Option<PathBuf> {

@@ -1,7 +1,8 @@
 use super::canvas::{Canvas, Pen};
 use super::merged_lines::merged_lines;
+use super::raster::Raster;
 use super::{Chart, PlotError, font, frame};
-use plotters::prelude::{BitMapBackend, BitMapElement, DrawingBackend, IntoDrawingArea, SVGBackend};
+use plotters::prelude::{BitMapBackend, DrawingBackend, IntoDrawingArea, SVGBackend};
 use std::path::Path;
 
 /// SVG units per point; the backends have integer coordinates, so one unit per point would be too coarse.
@@ -82,51 +83,28 @@ impl Figure {
         Ok(merged_lines(&text.replacen(&size_in_units, &size_in_points, 1)))
     }
 
+    /// Draws the figure in pixels.
+    fn raster(&self) -> Result<Raster, PlotError> {
+        let (width, height) = self.size();
+        let scale = PNG_PIXELS_PER_POINT * OVERSAMPLING;
+        let mut raster = Raster::new(width * scale, height * scale);
+        let size = (raster.width, raster.height);
+        self.draw(BitMapBackend::with_buffer(&mut raster.pixels, size), scale, Pen::Pixels)?;
+        Ok(raster.downsampled(OVERSAMPLING))
+    }
+
     /// Writes `NAME.svg` and `NAME.png` into `folder`.
     ///
     /// # Errors
     /// When the figure cannot be drawn, or a file cannot be written.
     pub fn save(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
-        let svg = folder.join(format!("{name}.svg"));
-        std::fs::write(&svg, self.svg()?)
-            .map_err(|source| PlotError::File { path: svg.display().to_string(), source })?;
-        self.save_png(&folder.join(format!("{name}.png")))
-    }
-
-    fn save_png(&self, path: &Path) -> Result<(), PlotError> {
-        let (width, height) = self.size();
-        let scale = PNG_PIXELS_PER_POINT * OVERSAMPLING;
-        let (wide, high) = (width * scale, height * scale);
-        let mut drawn = vec![0_u8; wide as usize * high as usize * 3];
-        self.draw(BitMapBackend::with_buffer(&mut drawn, (wide, high)), scale, Pen::Pixels)?;
-
-        let size = (width * PNG_PIXELS_PER_POINT, height * PNG_PIXELS_PER_POINT);
-        let pixels = downsampled(&drawn, wide as usize, OVERSAMPLING as usize);
-        let area = BitMapBackend::new(path, size).into_drawing_area();
-        let Some(image) = BitMapElement::with_owned_buffer((0, 0), size, pixels) else {
-            return Err(PlotError::Drawing("the PNG buffer does not have the size of the image".to_owned()));
+        let write = |ending: &str, bytes: &[u8]| {
+            let path = folder.join(format!("{name}.{ending}"));
+            std::fs::write(&path, bytes).map_err(|source| PlotError::File { path: path.display().to_string(), source })
         };
-        area.draw(&image).map_err(PlotError::drawing)?;
-        area.present().map_err(PlotError::drawing)
+        write("svg", self.svg()?.as_bytes())?;
+        write("png", &self.raster()?.png()?)
     }
-}
-
-/// Downsamples an RGB image: each output pixel is the mean of `side` x `side` pixels.
-fn downsampled(drawn: &[u8], wide: usize, side: usize) -> Vec<u8> {
-    let high = drawn.len() / 3 / wide;
-    let mut pixels = Vec::with_capacity(drawn.len() / (side * side));
-    for row in 0..high / side {
-        for column in 0..wide / side {
-            for channel in 0..3 {
-                let sum: usize = (0..side * side)
-                    .map(|k| (row * side + k / side) * wide + column * side + k % side)
-                    .map(|pixel| usize::from(drawn[pixel * 3 + channel]))
-                    .sum();
-                pixels.push((sum / (side * side)) as u8);
-            }
-        }
-    }
-    pixels
 }
 
 #[cfg(test)]
@@ -158,7 +136,11 @@ mod tests {
         let (first, svg) = (bytes("wave.png"), bytes("wave.svg"));
         figure().save(folder.path(), "wave").unwrap();
         assert!(first == bytes("wave.png") && svg == bytes("wave.svg"));
-        assert_eq!(&first[1..4], b"PNG");
+        let mut reader = png::Decoder::new(std::io::Cursor::new(first)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height), (720 * PNG_PIXELS_PER_POINT, 250 * PNG_PIXELS_PER_POINT));
+        assert!(pixels == figure().raster().unwrap().pixels);
     }
 
     #[test]

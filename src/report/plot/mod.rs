@@ -14,6 +14,7 @@ mod frame;
 mod legend;
 mod merged_lines;
 mod palette;
+mod raster;
 mod stroke;
 
 pub use chart::{BandPoint, Cell, Cells, Chart, Mark, Series, SignedDot, SignedDots, Tick, robust_range};
