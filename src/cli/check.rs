@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::Path;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, Source, SpecError, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find};
 use zsim_dynamics::{HeadModel, HeadSpec};
 use zsim_elasticity::{ElasticityError, SpringSpec};
 use zsim_estimation::{EstimationError, EstimatorSpec};
@@ -114,17 +114,17 @@ fn kind_by_folder(file: &str) -> Option<Kind> {
 
 fn parse_as(kind: Kind, source: &Source) -> Result<(), SpecError> {
     match kind {
-        Kind::Scene => parse::<SceneSpec>(source).map(drop),
+        Kind::Scene => SceneSpec::parse(source).map(drop),
         Kind::Head => HeadSpec::read(source).map(drop),
-        Kind::Motion => parse::<MotionSpec>(source).map(drop),
-        Kind::Lidar => parse::<LidarSpec>(source).map(drop),
-        Kind::Imu => parse::<ImuSpec>(source).map(drop),
-        Kind::Clock => parse::<ClocksSpec>(source).map(drop),
-        Kind::Faults => parse::<FaultsSpec>(source).map(drop),
-        Kind::Estimator => parse::<EstimatorSpec>(source).map(drop),
-        Kind::Spring => parse::<SpringSpec>(source).map(drop),
+        Kind::Motion => MotionSpec::parse(source).map(drop),
+        Kind::Lidar => LidarSpec::parse(source).map(drop),
+        Kind::Imu => ImuSpec::parse(source).map(drop),
+        Kind::Clock => ClocksSpec::parse(source).map(drop),
+        Kind::Faults => FaultsSpec::parse(source).map(drop),
+        Kind::Estimator => EstimatorSpec::parse(source).map(drop),
+        Kind::Spring => SpringSpec::parse(source).map(drop),
         Kind::Study => study(source).map(drop),
-        Kind::Experiment => parse::<ExperimentSpec>(source).map(drop),
+        Kind::Experiment => ExperimentSpec::parse(source).map(drop),
     }
 }
 
@@ -136,7 +136,7 @@ enum Study {
 
 /// Parses a study of either type; if neither fits, returns the error with the larger line number.
 fn study(source: &Source) -> Result<Study, SpecError> {
-    match (parse(source), parse(source)) {
+    match (DesignSpec::parse(source), SweepSpec::parse(source)) {
         (Ok(design), _) => Ok(Study::Design(design)),
         (_, Ok(sweep)) => Ok(Study::Sweep(sweep)),
         (Err(design), Err(sweep)) => {
@@ -159,7 +159,7 @@ impl Study {
 fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
     let spec_error = |error: &dyn std::error::Error| SpecError::plain(source.name.clone(), error.to_string());
     match kind {
-        Kind::Scene => match World::build(&parse::<SceneSpec>(source)?, source) {
+        Kind::Scene => match World::build(&SceneSpec::parse(source)?, source) {
             Ok(world) => {
                 world.notes().iter().for_each(|note| eprintln!("note: {note}"));
                 Ok(())
@@ -171,21 +171,21 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(zsim_dynamics::DynamicsError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Motion => match parse::<MotionSpec>(source)?.build(source, Some(&any_route()), 120.0, Seed(1)) {
+        Kind::Motion => match MotionSpec::parse(source)?.build(source, Some(&any_route()), 120.0, Seed(1)) {
             Ok(_) => Ok(()),
             Err(zsim_motion::MotionError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Lidar => Lidar::new(&parse::<LidarSpec>(source)?, source).map(drop),
-        Kind::Imu => Imu::new(&parse::<ImuSpec>(source)?, source).map(drop),
-        Kind::Clock => Clocks::new(&parse::<ClocksSpec>(source)?, source, EPOCH).map(drop),
-        Kind::Faults => Faults::new(&parse::<FaultsSpec>(source)?.with_files(source)?, source).map(drop),
-        Kind::Estimator => match parse::<EstimatorSpec>(source)?.check() {
+        Kind::Lidar => Lidar::new(&LidarSpec::parse(source)?, source).map(drop),
+        Kind::Imu => Imu::new(&ImuSpec::parse(source)?, source).map(drop),
+        Kind::Clock => Clocks::new(&ClocksSpec::parse(source)?, source, EPOCH).map(drop),
+        Kind::Faults => Faults::new(&FaultsSpec::parse(source)?.with_files(source)?, source).map(drop),
+        Kind::Estimator => match EstimatorSpec::parse(source)?.check() {
             Ok(()) => Ok(()),
             Err(EstimationError::Setting { key, message }) => Err(SpecError::about(source, key, message)),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Spring => match parse::<SpringSpec>(source)?.design() {
+        Kind::Spring => match SpringSpec::parse(source)?.design() {
             Ok(_) => Ok(()),
             Err(ElasticityError::Spec(error)) => Err(error),
             Err(error) => Err(SpecError::plain(source.name.clone(), error.to_string())),
@@ -195,6 +195,6 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(StudyError::Spec(error)) => Err(error),
             Err(error) => Err(spec_error(&error)),
         },
-        Kind::Experiment => parse::<ExperimentSpec>(source)?.check(source),
+        Kind::Experiment => ExperimentSpec::parse(source)?.check(source),
     }
 }

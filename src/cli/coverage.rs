@@ -6,9 +6,9 @@ use super::{Completion, coverage_text, output, quantity};
 use clap::Args;
 use std::path::Path;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, find};
 use zsim_dynamics::{self, ContactWatch, HeadModel, HeadState};
-use zsim_sensors::{Imu, Lidar};
+use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use zsim_study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
 use zsim_study::replace_text;
 
@@ -49,9 +49,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let (head, head_source) = zsim_dynamics::load(&arguments.head)?;
     let head = HeadModel::new(&head, &head_source)?;
     let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
-    let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
+    let lidar = Lidar::new(&LidarSpec::parse(&lidar_source)?, &lidar_source)?;
     let imu_source = find(Kind::Imu, &arguments.imu)?;
-    let imu = Imu::new(&parse(&imu_source)?, &imu_source)?;
+    let imu = Imu::new(&ImuSpec::parse(&imu_source)?, &imu_source)?;
     let (motion, motion_source) = zsim_motion::load(&arguments.motion)?;
     let until_s = arguments.from + arguments.duration;
     let motion = motion.build(&motion_source, Some(&any_route()), until_s, Seed(arguments.seed))?;

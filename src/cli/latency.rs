@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::Args;
 use std::path::PathBuf;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, find};
 use zsim_study::latency::text_table;
 use zsim_study::sweep::{Plan, Shard, SweepSpec};
 
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let source = find(Kind::Study, STUDY)?;
-    let mut spec: SweepSpec = parse(&source)?;
+    let mut spec = SweepSpec::parse(&source)?;
     let scenario = arguments.scenario.scenario(&arguments.scene);
     let Seed(seed) = scenario.seed;
     spec.seeds = vec![seed];

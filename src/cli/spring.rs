@@ -5,10 +5,10 @@ use super::bars::WorkBar;
 use super::{Completion, output, spring_text};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
-use zsim_base::spec::{Kind, Source, SpecError, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find};
 use zsim_dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
 use zsim_elasticity::SpringSpec;
-use zsim_sensors::{Imu, Lidar};
+use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use zsim_study::coverage::{CoveragePlan, coverage_figure};
 use zsim_study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
 use zsim_study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
@@ -115,9 +115,9 @@ fn export(wanted: &Export, global: &Global) -> anyhow::Result<Completion> {
 fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let subject = head_of(file, &arguments.head)?;
     let lidar_source = find(Kind::Lidar, &arguments.lidar)?;
-    let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
+    let lidar = Lidar::new(&LidarSpec::parse(&lidar_source)?, &lidar_source)?;
     let imu_source = find(Kind::Imu, &arguments.imu)?;
-    let imu = Imu::new(&parse(&imu_source)?, &imu_source)?;
+    let imu = Imu::new(&ImuSpec::parse(&imu_source)?, &imu_source)?;
     let given = [("--pitch", Some(arguments.pitch)), ("--frequency", arguments.frequency)];
     for (name, value) in given {
         if let Some(value) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
@@ -167,7 +167,7 @@ fn write_files(folder: &Path, subject: &Subject, report: &SpringReport) -> anyho
 fn head_of(file: &str, head: &str) -> anyhow::Result<Subject> {
     let stem = |path: &str| Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let as_spring =
-        find(Kind::Spring, file).and_then(|source| parse::<SpringSpec>(&source).map(|spring| (spring, source)));
+        find(Kind::Spring, file).and_then(|source| SpringSpec::parse(&source).map(|spring| (spring, source)));
     match (zsim_dynamics::load(file), as_spring) {
         (Ok((spec, source)), _) => Ok(Subject { name: stem(file), spec, source }),
         (Err(_), Ok((bare, source))) => {
@@ -189,7 +189,7 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<Subject> {
 
 fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
     let source = find(Kind::Study, &design.file)?;
-    let spec: DesignSpec = parse(&source).map_err(|error| match parse::<SweepSpec>(&source) {
+    let spec = DesignSpec::parse(&source).map_err(|error| match SweepSpec::parse(&source) {
         Ok(_) => {
             SpecError::plain(&source.name, format!("it is a sweep, not a spring search: zsim study {}", design.file))
         }

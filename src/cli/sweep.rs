@@ -10,9 +10,9 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use zsim_base::spec::{Kind, SpecError, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, SpecError, find};
 use zsim_study::spring::design::DesignSpec;
-use zsim_study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepStatus, limit_process};
+use zsim_study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepSpec, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -120,7 +120,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 pub(super) fn plan_of(name: &str) -> anyhow::Result<Plan> {
     let source = find(Kind::Study, name)?;
     let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let spec = parse(&source).map_err(|error| match parse::<DesignSpec>(&source) {
+    let spec = SweepSpec::parse(&source).map_err(|error| match DesignSpec::parse(&source) {
         Ok(_) => {
             SpecError::plain(&source.name, format!("it is a spring search, not a sweep: zsim spring design {name}"))
         }

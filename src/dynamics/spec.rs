@@ -253,11 +253,15 @@ impl NamedSpec for HeadSpec {
     const KIND: Kind = Kind::Head;
     type Error = SpecError;
 
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
+
     /// Replaces a spring that is given by name by its description, so that its settings can be varied.
     fn resolved(self, source: &Source) -> Result<Self, SpecError> {
         let mut head = self.with_files_of(source);
         if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
-            *spring = spring.resolved()?;
+            *spring = SpringSpec::resolved(spring)?;
         }
         Ok(head)
     }

@@ -2,7 +2,7 @@
 
 use super::{Coil, ElasticityError, Material, Matrix6, Spring, Winding};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, SpecError, checked};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 
 /// Spec of a spring: `specs/springs/NAME.ron`, or a value within a head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
@@ -239,5 +239,14 @@ impl SpringDesign {
                 _ => Err(ElasticityError::CannotBeDivided { segments }),
             },
         }
+    }
+}
+
+impl NamedSpec for SpringSpec {
+    const KIND: Kind = Kind::Spring;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
     }
 }

@@ -2,7 +2,7 @@ pub use super::surfel_spec::{MatchingSpec, SurfelSpec};
 
 use super::{EstimationError, RegistrationSpec};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, SpecError};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse};
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -232,6 +232,10 @@ impl EstimatorSpec {
 impl NamedSpec for EstimatorSpec {
     const KIND: Kind = Kind::Estimator;
     type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
 }
 
 #[cfg(test)]

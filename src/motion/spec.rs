@@ -92,4 +92,8 @@ impl MotionSpec {
 impl NamedSpec for MotionSpec {
     const KIND: Kind = Kind::Motion;
     type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
 }

@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 use zsim_base::time::{Span, Stamp};
 
 /// Clocks of the sensors.
@@ -163,6 +163,10 @@ impl Clock {
 impl NamedSpec for ClocksSpec {
     const KIND: Kind = Kind::Clock;
     type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::{Manifest, StudyError};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use zsim_base::measurement::{ImuAveraging, ImuNoise, LidarNoise};
-use zsim_base::spec::{Kind, SpecError, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, SpecError, find};
 use zsim_report::{NoiseMetrics, SensorMetrics, noise_sources};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use zsim_simulation::Run;
@@ -210,13 +210,11 @@ impl Values {
 /// An IMU without a known specification.
 pub(super) fn unknown_imu() -> Result<Imu, SpecError> {
     let source = find(Kind::Imu, "unknown")?;
-    let spec: ImuSpec = parse(&source)?;
-    Imu::new(&spec, &source)
+    Imu::new(&ImuSpec::parse(&source)?, &source)
 }
 
 /// The lidar of the paper, for a lidar without a known specification.
 fn unknown_lidar() -> Result<Lidar, SpecError> {
     let source = find(Kind::Lidar, "utm30lx")?;
-    let spec: LidarSpec = parse(&source)?;
-    Lidar::new(&spec, &source)
+    Lidar::new(&LidarSpec::parse(&source)?, &source)
 }

@@ -96,6 +96,10 @@ impl NamedSpec for SceneSpec {
     const KIND: Kind = Kind::Scene;
     type Error = WorldError;
 
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
+
     fn resolved(self, source: &Source) -> Result<Self, WorldError> {
         self.with_includes(source)
     }

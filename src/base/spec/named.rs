@@ -1,6 +1,6 @@
 //! Specs that a run refers to by name.
 
-use super::{Kind, Source, SpecError, find, parse};
+use super::{Kind, Source, SpecError, find};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -12,6 +12,12 @@ pub trait NamedSpec: DeserializeOwned {
 
     /// Why a spec, or a file that it includes, is invalid.
     type Error: From<SpecError>;
+
+    /// Parses the text of a spec: [`parse`](super::parse), compiled in the room of the spec, once for all that read it.
+    ///
+    /// # Errors
+    /// As [`parse`](super::parse).
+    fn parse(source: &Source) -> Result<Self, SpecError>;
 
     /// The spec with the content of the files that it includes.
     ///
@@ -57,7 +63,7 @@ impl<T: NamedSpec> Named<T> {
     /// # Errors
     /// As [`Named::load`].
     pub fn parse(source: Source) -> Result<Self, T::Error> {
-        let spec = parse::<T>(&source)?.resolved(&source)?;
+        let spec = T::parse(&source)?.resolved(&source)?;
         let folder = source.folder.as_ref().map(|folder| folder.canonicalize().unwrap_or_else(|_| folder.clone()));
         Ok(Self { name: source.name.clone(), folder, spec, source: Some(source) })
     }

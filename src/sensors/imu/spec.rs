@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 use zsim_base::geometry::STANDARD_GRAVITY_M_PER_S2;
 use zsim_base::measurement::ImuAveraging;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 
 /// Accepted sample rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
@@ -283,4 +283,8 @@ impl GaussMarkovSpec {
 impl NamedSpec for ImuSpec {
     const KIND: Kind = Kind::Imu;
     type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
 }

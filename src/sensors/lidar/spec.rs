@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 use zsim_base::geometry::Vector;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 
 /// Accepted scan rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
@@ -215,4 +215,8 @@ impl LidarSpec {
 impl NamedSpec for LidarSpec {
     const KIND: Kind = Kind::Lidar;
     type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
 }

@@ -1,7 +1,7 @@
 //! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
-use zsim_base::spec::{Kind, NamedSpec, Position, Source, SpecError, text_file};
+use zsim_base::spec::{Kind, NamedSpec, Position, Source, SpecError, parse, text_file};
 
 /// Maximum number of arrival times in a file: bounds the memory.
 const MAX_ARRIVALS: usize = 1_000_000;
@@ -54,6 +54,10 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
 impl NamedSpec for FaultsSpec {
     const KIND: Kind = Kind::Faults;
     type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
+    }
 
     fn resolved(self, source: &Source) -> Result<Self, SpecError> {
         self.with_files(source)

@@ -5,7 +5,7 @@ use crate::gains::AXES;
 use crate::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
-use zsim_base::spec::{Kind, Source, SpecError, checked, find_from, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find_from, parse};
 use zsim_dynamics::HeadSpec;
 use zsim_motion::Axis;
 
@@ -337,5 +337,14 @@ impl DesignedSpec {
             return invalid("head", format!("the head \"{}\" is rigid: it has no damping to fit", self.head));
         }
         Ok(head)
+    }
+}
+
+impl NamedSpec for ExperimentSpec {
+    const KIND: Kind = Kind::Experiment;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
     }
 }

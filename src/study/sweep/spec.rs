@@ -3,7 +3,7 @@
 use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use zsim_base::spec::checked;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 
 /// A sweep: a base run, the parameters to vary, and the measures to report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -202,5 +202,14 @@ impl Setting {
             Self::Number(number) => (*number).into(),
             Self::Text(word) => word.as_str().into(),
         }
+    }
+}
+
+impl NamedSpec for SweepSpec {
+    const KIND: Kind = Kind::Study;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
     }
 }

@@ -17,9 +17,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, Source, SpecError, find_from, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
-use zsim_sensors::Lidar;
+use zsim_sensors::{Lidar, LidarSpec};
 
 /// Result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -97,7 +97,7 @@ impl DesignSearch {
             return Err(SpecError::about(source, "head", message).into());
         }
         let lidar_source = find_from(Kind::Lidar, source, &spec.lidar)?;
-        let lidar = Lidar::new(&parse(&lidar_source)?, &lidar_source)?;
+        let lidar = Lidar::new(&LidarSpec::parse(&lidar_source)?, &lidar_source)?;
         if spec.goals.is_empty() {
             return Err(SpecError::about(source, "goals", "at least one goal is required").into());
         }

@@ -4,7 +4,7 @@ use super::super::Shake;
 use super::limits::BuildLimitsSpec;
 use crate::sweep::{GoalSpec, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::checked;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 use zsim_elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
 
 /// A search for a spring: design space, goals and limits.
@@ -141,5 +141,14 @@ impl CoilDesign {
             material: self.material,
             coil_restitution: 1.0,
         }
+    }
+}
+
+impl NamedSpec for DesignSpec {
+    const KIND: Kind = Kind::Study;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse(source)
     }
 }
