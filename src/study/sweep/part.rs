@@ -166,7 +166,7 @@ mod tests {
         [("sag_mm", ColumnType::Numbers), ("error", ColumnType::Text), ("details", ColumnType::Text)].map(of).to_vec()
     }
 
-    fn unit(name: &str, count: u64) -> Unit {
+    fn unit_of(name: &str, count: u64) -> Unit {
         Unit { identity: ContentHash::of([name.as_bytes()]), first: 0, count }
     }
 
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_part_is_read_back_and_damage_of_any_byte_is_found() {
-        let unit = unit("a", 2);
+        let unit = unit_of("a", 2);
         let figures = Column::Numbers(vec![Some(0.1 + 0.2), None]);
         let errors = Column::Text(vec![None, Some("no \"spring\", \u{e4}".to_owned())]);
         let details = "(\n    map: \"a,\",\r\n)\n";
@@ -199,13 +199,13 @@ mod tests {
             }
         }
         assert_eq!(read(&[bytes.as_slice(), b"\n"].concat(), &unit), None);
-        assert_eq!(read(&bytes, &self::unit("b", 2)), None, "a part of another unit");
+        assert_eq!(read(&bytes, &unit_of("b", 2)), None, "a part of another unit");
         assert_eq!(read(&bytes, &Unit { count: 3, ..unit }), None);
     }
 
     #[test]
     fn foreign_files_and_invalid_cells_are_damage() {
-        let unit = unit("a", 1);
+        let unit = unit_of("a", 1);
         assert!(read(&with_table(&unit, "sag_mm,error,details\n1.5,,\n"), &unit).is_some());
         for table in [
             "",
