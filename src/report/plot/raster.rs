@@ -43,7 +43,7 @@ impl Raster {
         let mut encoder = png::Encoder::new(&mut file, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        // The smaller files of the default take seven times as long.
+        // The smaller files of the default take four to seven times as long.
         encoder.set_compression(png::Compression::Fast);
         let mut writer = encoder.write_header().map_err(PlotError::drawing)?;
         writer.write_image_data(&self.pixels).map_err(PlotError::drawing)?;
