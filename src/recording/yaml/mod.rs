@@ -4,45 +4,12 @@
 //! Depth and size of a document are limited, also after its aliases are expanded, so that no file can exhaust memory or
 //! stack.
 
+mod error;
 mod node;
 mod tree;
 
-use self::node::Position;
+pub use self::error::YamlError;
 use serde::de::DeserializeOwned;
-use std::fmt;
-
-/// An error of a YAML document, with its line and column if they are known.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct YamlError {
-    message: String,
-    position: Option<Position>,
-}
-
-impl YamlError {
-    fn new(message: impl Into<String>, position: Position) -> Self {
-        Self { message: message.into(), position: Some(position) }
-    }
-
-    /// The error, at `position` unless it has a position already.
-    fn at(self, position: Position) -> Self {
-        Self { position: self.position.or(Some(position)), ..self }
-    }
-}
-
-impl fmt::Display for YamlError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)?;
-        self.position.map_or(Ok(()), |(line, column)| write!(f, " at line {line}, column {column}"))
-    }
-}
-
-impl std::error::Error for YamlError {}
-
-impl serde::de::Error for YamlError {
-    fn custom<T: fmt::Display>(message: T) -> Self {
-        Self { message: message.to_string(), position: None }
-    }
-}
 
 /// Reads a document; an empty one is null.
 ///

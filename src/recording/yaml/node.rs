@@ -1,12 +1,9 @@
 //! A node of a document, and what serde reads from it.
 
-use super::YamlError;
+use super::error::{Position, YamlError};
 use serde::de::value::SeqDeserializer;
 use serde::de::{DeserializeSeed, Deserializer, Error, IntoDeserializer, MapAccess, Unexpected, Visitor};
 use serde::forward_to_deserialize_any;
-
-/// A position in the text: line and column, from 1.
-pub(super) type Position = (usize, usize);
 
 /// A node and where it starts.
 #[derive(Debug, Clone)]

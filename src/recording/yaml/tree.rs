@@ -1,7 +1,7 @@
 //! Builds the tree of a document from the events of the parser.
 
-use super::YamlError;
-use super::node::{Node, Position, Value};
+use super::error::{Position, YamlError};
+use super::node::{Node, Value};
 use granit_parser::{Event, Marker, Parser, ScalarStyle};
 use std::collections::{BTreeMap, BTreeSet};
 
