@@ -91,6 +91,8 @@ impl Segments {
 pub(super) struct Transformer {
     segments: Segments,
     weights: Vec<f64>,
+    /// Sum of the squared weights.
+    power: f64,
     fft: Arc<dyn RealToComplex<f64>>,
     windowed: Vec<f64>,
     scratch: Vec<Complex<f64>>,
@@ -100,7 +102,9 @@ impl Transformer {
     pub fn new(segments: Segments) -> Self {
         let fft = RealFftPlanner::new().plan_fft_forward(segments.length);
         let (windowed, scratch) = (fft.make_input_vec(), fft.make_scratch_vec());
-        Self { segments, weights: segments.window.weights(segments.length), fft, windowed, scratch }
+        let weights = segments.window.weights(segments.length);
+        let power = weights.iter().map(|w| w * w).sum();
+        Self { segments, weights, power, fft, windowed, scratch }
     }
 
     /// Allocates the output buffer of one transform.
@@ -123,9 +127,8 @@ impl Transformer {
 
     /// The factor from the squared modulus of bin `bin` to one-sided power spectral density, unit^2/Hz.
     pub fn density_scale(&self, bin: usize, rate_hz: f64) -> f64 {
-        let power: f64 = self.weights.iter().map(|w| w * w).sum();
         let has_no_mirror = bin == 0 || 2 * bin == self.segments.length;
-        if has_no_mirror { 1.0 / (power * rate_hz) } else { 2.0 / (power * rate_hz) }
+        if has_no_mirror { 1.0 / (self.power * rate_hz) } else { 2.0 / (self.power * rate_hz) }
     }
 }
 
