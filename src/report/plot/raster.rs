@@ -20,15 +20,15 @@ impl Raster {
         let (wide, side) = (self.width as usize, side as usize);
         let (width, height) = (wide / side, self.height as usize / side);
         let mut pixels = Vec::with_capacity(width * height * 3);
-        for row in 0..height {
+        for rows in self.pixels.chunks_exact(wide * 3 * side) {
             for column in 0..width {
-                for channel in 0..3 {
-                    let sum: usize = (0..side * side)
-                        .map(|k| (row * side + k / side) * wide + column * side + k % side)
-                        .map(|pixel| usize::from(self.pixels[pixel * 3 + channel]))
-                        .sum();
-                    pixels.push((sum / (side * side)) as u8);
+                let mut sums = [0; 3];
+                for row in rows.chunks_exact(wide * 3) {
+                    for pixel in row[column * side * 3..][..side * 3].as_chunks::<3>().0 {
+                        (0..3).for_each(|channel| sums[channel] += u32::from(pixel[channel]));
+                    }
                 }
+                pixels.extend(sums.map(|sum| (sum / (side * side) as u32) as u8));
             }
         }
         Self { width: width as u32, height: height as u32, pixels }
