@@ -149,6 +149,9 @@ pub(super) struct EstimatorArguments {
     /// Keep mixed pixels, isolated points and moving points in the cloud
     #[arg(long)]
     keep_outliers: bool,
+    /// Write trajectories, map and metrics alone: no cloud, no result.mcap, no plots, no page
+    #[arg(long, conflicts_with_all = ["cloud_format", "keep_outliers"])]
+    metrics_only: bool,
     /// Report the time that each part of the open loop took
     #[arg(long)]
     pub profile: bool,
@@ -176,7 +179,8 @@ impl EstimatorArguments {
     pub(super) fn options(&self) -> anyhow::Result<EstimateOptions> {
         let mut estimator = self.settings.spec()?;
         estimator.extrinsics.estimated |= self.refine_extrinsics;
-        let cloud = CloudOptions { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
+        let options = CloudOptions { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
+        let cloud = (!self.metrics_only).then_some(options);
         Ok(EstimateOptions { closed_loop: !self.open_loop, cloud, ..EstimateOptions::with(estimator) })
     }
 }

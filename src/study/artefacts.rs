@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use zsim_base::geometry::{Pose, Trajectory, Vector};
 use zsim_estimation::ReturnClass;
+use zsim_report::Metrics;
 use zsim_report::page::RunPage;
 use zsim_report::plot::Figure;
 
@@ -68,11 +69,16 @@ fn outline<'a>(
     cells.into_iter().map(|(x, y)| Vector::new(x as f64 * CELL_M, y as f64 * CELL_M, height)).collect()
 }
 
-/// Writes the plots and the page, then `metrics.json`, which marks the folder as complete.
+/// Writes the plots and the page, then `metrics.json`.
 pub(super) fn write(folder: &Path, plots: &[Plot], page: &RunPage) -> Result<(), StudyError> {
     let pictures = folder.join("plots");
     std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;
     plots.par_iter().try_for_each(|plot| plot.figure.save(&pictures, plot.name))?;
     write_text(folder, &folder.join("report.html"), &page.html()?)?;
-    write_text(folder, &folder.join(METRICS), &page.metrics.to_json()?)
+    write_metrics(folder, page.metrics)
+}
+
+/// Writes `metrics.json`, which marks the folder as complete.
+pub(super) fn write_metrics(folder: &Path, metrics: &Metrics) -> Result<(), StudyError> {
+    write_text(folder, &folder.join(METRICS), &metrics.to_json()?)
 }

@@ -20,7 +20,6 @@ use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::sampled_truth::SampledTruth;
 use super::sensor_models::RecordedSensors;
-use super::viewer_files::write_for_result;
 use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use std::path::Path;
 use zsim_estimation::{EstimatorSpec, Timing};
@@ -45,8 +44,8 @@ pub struct EstimateOptions {
     pub body_frame: Option<String>,
     /// Whether to run the global registration with loop closure after the open loop.
     pub closed_loop: bool,
-    /// Options of the cloud.
-    pub cloud: CloudOptions,
+    /// Options of the cloud; `None` to write trajectories, map and metrics alone, without cloud, result, plots and page.
+    pub cloud: Option<CloudOptions>,
     /// The map in which to localise the head; `None` to start a new map.
     pub map: Option<MapOptions>,
 }
@@ -54,7 +53,7 @@ pub struct EstimateOptions {
 impl EstimateOptions {
     /// Options with these estimator settings, loop closure, and defaults.
     pub fn with(estimator: EstimatorSpec) -> Self {
-        let (calibration, cloud) = (CalibrationSpec::default(), CloudOptions::default());
+        let (calibration, cloud) = (CalibrationSpec::default(), Some(CloudOptions::default()));
         let (ignore_manifest, body_frame, closed_loop, map) = (false, None, true, None);
         Self { estimator, calibration, ignore_manifest, body_frame, closed_loop, cloud, map }
     }
@@ -73,7 +72,8 @@ pub struct EstimateResult {
 ///
 /// The files are `manifest.ron`, `open_loop.tum`, `closed_loop.tum`, `map.ply`, `result.mcap` with its layout for Foxglove,
 /// `cloud.ply` or `cloud.las`, `integrity.csv`, `windows.csv`, `metrics.json`, `plots/` and `report.html`. Map, cloud and
-/// result are those of the closed loop if it was computed. If the recording has the truth, the trajectory is evaluated
+/// result are those of the closed loop if it was computed. Without [`EstimateOptions::cloud`] result, cloud, `plots/` and
+/// `report.html` are left out. If the recording has the truth, the trajectory is evaluated
 /// against it; if it also has the scene, the cloud is evaluated against the surfaces.
 ///
 /// Files of these names from an earlier run are removed first. `metrics.json` is written last: a folder without it is
@@ -122,7 +122,6 @@ pub(super) fn estimate_in(
     let mut bound = inputs.bound()?;
     let loops = inputs.run(bound.as_mut(), folder, watch)?;
     let (registered, bound) = inputs.register(&loops, bound, folder, watch)?;
-    write_for_result(folder)?;
     let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
 
     watch.progress(Stage::Reporting, 0.0, None);
@@ -145,10 +144,15 @@ pub(super) fn estimate_in(
         closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
         clock: comparison::clock_metrics(run, truth),
         lidar: comparison::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
-        ..metrics(origin, run, &registered, best.comparison)
+        ..metrics(origin, run, registered.as_ref(), best.comparison)
     };
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
+    watch.check_stop()?;
+    let Some(registered) = registered else {
+        artefacts::write_metrics(folder, &metrics)?;
+        return Ok(EstimateResult { metrics, timing: loops.open.timing });
+    };
     let results = RunResults {
         origin,
         open: run,
@@ -160,7 +164,6 @@ pub(super) fn estimate_in(
         pairs: pairs.as_ref(),
         points: &registered.page_points,
     };
-    watch.check_stop()?;
     let plots = artefacts::plots(&results, &registered.sample, options.estimator.surfels.min_range_m);
     artefacts::write(folder, &plots, &results.page(&metrics, &origin.manifest.to_ron()?))?;
     Ok(EstimateResult { metrics, timing: loops.open.timing })
@@ -188,16 +191,16 @@ impl<'a> LoopInputs<'a> {
         .map(Some)
     }
 
-    /// Registers the cloud along the best estimate, and meanwhile completes `bound` if the truth is known.
+    /// Registers the cloud along the best estimate if it is wanted, and meanwhile completes `bound` if the truth is known.
     fn register(
         &self,
         loops: &Loops,
         bound: Option<BoundAccumulator>,
         folder: &Path,
         watch: &mut ProgressMonitor,
-    ) -> Result<(RegisteredCloud, Option<RecordingBound>), StudyError> {
+    ) -> Result<(Option<RegisteredCloud>, Option<RecordingBound>), StudyError> {
         let (best, with_truth) = (loops.best(), loops.truth.is_some());
-        let registration = Registration {
+        let registration = self.options.cloud.map(|options| Registration {
             reader: self.reader,
             selection: self.selection,
             calibration: &self.found.calibration,
@@ -207,14 +210,15 @@ impl<'a> LoopInputs<'a> {
             lidar: best.lidar,
             returns: loops.open.returns,
             with_truth,
-            options: self.options.cloud,
-        };
+            options,
+        });
         let stop = watch.stop;
         let complete = || {
             let bound = bound.filter(|_| with_truth)?;
             Some(bound.of_measurements(self.reader, self.selection, &mut |_| check(stop)))
         };
-        let (bound, registered) = with_background(complete, || registration.run(folder, watch));
+        let register = || registration.map(|registration| registration.run(folder, watch)).transpose();
+        let (bound, registered) = with_background(complete, register);
         Ok((registered?, bound.transpose()?))
     }
 
@@ -325,7 +329,7 @@ fn close_loops(
 fn metrics(
     origin: &Origin,
     run: &OpenLoopRun,
-    registered: &RegisteredCloud,
+    registered: Option<&RegisteredCloud>,
     comparison: Option<&Comparison>,
 ) -> Metrics {
     let inputs = origin.manifest.run.as_ref();
@@ -336,7 +340,9 @@ fn metrics(
         seed: inputs.map(|inputs| inputs.seed.0),
         duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
         simulation: origin.simulation.map(comparison::simulation_metrics).unwrap_or_default(),
-        cloud: cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings),
+        cloud: registered
+            .map(|registered| cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings))
+            .unwrap_or_default(),
         peak_rss_mib: memory::peak_rss_mib(),
         ..Metrics::default()
     }

@@ -3,6 +3,7 @@
 use super::cloud_files::{CloudFiles, CloudOptions};
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::truth_cursor::{TrueState, TruthCursor};
+use super::viewer_files::write_for_result;
 use super::{ProgressMonitor, Stage, StudyError};
 use std::path::Path;
 use zsim_base::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
@@ -94,7 +95,7 @@ pub(super) struct Registration<'a> {
 }
 
 impl Registration<'_> {
-    /// Projects all beams by the estimate and writes the cloud files and `result.mcap` to `folder`.
+    /// Projects all beams by the estimate and writes the cloud files, `result.mcap` and its layout to `folder`.
     pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<RegisteredCloud, StudyError> {
         read_ahead(self.reader, self.selection, |measurements| self.project(measurements, folder, watch)).0
     }
@@ -128,6 +129,7 @@ impl Registration<'_> {
             failure: None,
             watch,
         };
+        write_for_result(folder)?;
         let result = folder.join("result.mcap");
         write_result(&result, self.body_frame, self.map_from_head, self.covariances, beams.by_ref())?;
         if let Some(failure) = beams.failure {

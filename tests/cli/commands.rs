@@ -3,7 +3,7 @@
 use crate::command::{run, zsim};
 use crate::skip;
 use serde_json::Value;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn root() -> PathBuf {
@@ -77,6 +77,29 @@ fn a_full_run_writes_all_files_independent_of_the_number_of_threads() {
     let written = std::fs::read_to_string(here.path().join("run/metrics.json")).unwrap();
     let written: Value = serde_json::from_str(&written).unwrap();
     assert_eq!(written["open_loop"], one["open_loop"]);
+    metrics_alone_are_those_of_the_whole_estimate(here.path(), &one);
+}
+
+/// Without cloud, result, plots and page the trajectories and all metrics but those of the cloud are the same.
+fn metrics_alone_are_those_of_the_whole_estimate(folder: &Path, whole: &Value) {
+    let (code, text, stderr) = run(folder, "estimate run/recording.mcap --metrics-only --out alone --json");
+    assert_eq!(code, 0, "{stderr}");
+    let alone: Value = serde_json::from_str(&text).unwrap();
+    for part in ["/integrity", "/losses", "/clock", "/open_loop/position_rmse_m", "/closed_loop/bound_rmse_m"] {
+        assert!(whole.pointer(part).is_some_and(|value| !value.is_null()), "{part}");
+        assert_eq!(whole.pointer(part), alone.pointer(part), "{part}");
+    }
+    assert!(alone["cloud"]["points"].is_null());
+    let bytes = |path: &str| std::fs::read(folder.join(path)).unwrap();
+    assert!(bytes("run/closed_loop.tum") == bytes("alone/closed_loop.tum"));
+    let mut files: Vec<String> = std::fs::read_dir(folder.join("alone"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    let expected =
+        ["closed_loop.tum", "integrity.csv", "manifest.ron", "map.ply", "metrics.json", "open_loop.tum", "windows.csv"];
+    assert_eq!(files, expected);
 }
 
 #[test]

@@ -18,7 +18,7 @@ fn fine_surfels_show_the_motion_along_a_corridor() {
         let (code, _, stderr) = run(here.path(), &simulated);
         assert_eq!(code, 0, "{stderr}");
         for (mean_m, estimator) in mean_m.iter_mut().zip(["default", "without.ron"]) {
-            let options = "--open-loop --quiet --json --force";
+            let options = "--open-loop --metrics-only --quiet --json --force";
             let (_, figures, stderr) =
                 run(here.path(), &format!("estimate run.mcap {options} --estimator {estimator} --out estimated"));
             let figures: Value = serde_json::from_str(&figures).unwrap_or_else(|_| panic!("{stderr}"));

@@ -66,7 +66,7 @@ fn full_run(case: &Case) -> (i32, String, String, Option<String>) {
     let Case { scene, lidar, duration_s, seed, .. } = case;
     let command = format!(
         "--scene {scene} --lidar {lidar} --motion {motion} --duration {duration_s}s --seed {seed} --faults faults.ron \
-         --threads 1 --quiet --json --out run"
+         --threads 1 --quiet --json --metrics-only --out run"
     );
     let (code, figures, stderr) = run(here.path(), &command);
     (code, figures, stderr, std::fs::read_to_string(here.path().join("run/open_loop.tum")).ok())
