@@ -143,6 +143,19 @@ fn invalid_stamps_do_not_cause_a_panic() {
     }
 }
 
+/// The estimate aborted for want of memory: the period of the IMU was taken for years.
+#[test]
+fn a_sample_long_before_all_others_is_not_used() {
+    let run = hall(23, 8.0);
+    let mut measurements = in_order(&run);
+    let Some(Measurement::Imu(first)) = measurements.iter_mut().find(|m| matches!(m, Measurement::Imu(_))) else {
+        panic!("there are samples")
+    };
+    first.stamp = Stamp::from_nanos(0);
+    let score = Score::of(&estimate(measurements), &run);
+    assert!(score.rmse_m < 0.003, "{score:?}");
+}
+
 #[test]
 fn a_start_in_motion_is_reported_and_estimated() {
     let mut run = hall(9, 12.0);

@@ -33,6 +33,8 @@ const MAX_LIDAR_GAP_S: f64 = 3.0;
 const TURNING_RAD_PER_S: f64 = 0.1;
 /// So many samples show whether an IMU has a period; a slow one is judged by those of this time, s.
 const JUDGED_BY: (usize, f64) = (100, 3.0);
+/// Samples before a longer pause do not show the period of the IMU, s.
+const MAX_PAUSE_AT_START_S: f64 = 10.0;
 /// Scans wait at most this long for IMU samples, s; this bounds the memory.
 const MAX_WAIT_FOR_IMU_S: f64 = 30.0;
 
@@ -257,7 +259,10 @@ impl Intake {
         }
         // Ignore later data, so that the order of arrival has no effect.
         let stamps: Vec<f64> = self.samples.stamps().filter(|s| *s <= enough_s).collect();
-        let imu = StampFilter::new(Regularity::of(&stamps)?, self.spec.clock.jitter_s);
+        // A lone sample long before the others would make the period as long.
+        let pause = stamps.windows(2).rposition(|pair| pair[1] - pair[0] > MAX_PAUSE_AT_START_S);
+        let stamps = &stamps[pause.map_or(0, |k| k + 1)..];
+        let imu = StampFilter::new(Regularity::of(stamps)?, self.spec.clock.jitter_s);
         self.scans.start(first_scan, enough_s)?;
         // The IMU must cover the first beam for any clock offset.
         self.next_start_s = start_s + MARGIN_S;
