@@ -10,7 +10,7 @@ use zsim_base::measurement::Measurement;
 /// Decodes the messages of the selected sensors as they arrive.
 ///
 /// Unlike [`super::Measurements`] it does not wait in order to sort by stamps: the estimator sorts measurements that arrive
-/// up to 0.1 s too late.
+/// up to 0.1 s too late. Nor does it remove steps of the clocks: a recording that is played again begins with a step back.
 pub struct Incoming {
     lidar_topic: String,
     imu_topic: String,
@@ -48,7 +48,7 @@ impl Incoming {
             return Vec::new();
         };
         let payload = Payload { bytes: message, wire: WireFormat::Cdr };
-        self.decoder.take(role, payload, &mut self.sorter, &mut self.loss);
+        self.decoder.take(role, None, payload, &mut self.sorter, &mut self.loss);
         let decoded = std::iter::from_fn(|| self.sorter.take(true));
         let new = decoded.filter(|measurement| self.duplicates.is_new(measurement)).collect();
         (self.loss.repeated_scans, self.loss.repeated_samples) = (self.duplicates.scans, self.duplicates.samples);

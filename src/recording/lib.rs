@@ -26,6 +26,7 @@
 //! [`EstimateMessages`] encodes the estimate.
 
 mod base_imu;
+mod clock_step;
 mod cloud;
 mod container;
 mod duplicates;
@@ -52,6 +53,7 @@ mod result;
 mod rosbag2;
 mod schema;
 mod selection;
+mod stamp_screen;
 mod stamp_sorter;
 mod topics;
 mod truth;
@@ -61,6 +63,7 @@ mod writer;
 mod yaml;
 
 pub use base_imu::BaseImuRecord;
+pub use clock_step::ClockStep;
 pub use cloud::CloudPoint;
 pub use ending::other_format;
 pub use error::RecordingError;

@@ -1,3 +1,4 @@
+use super::clock_step::ClockStep;
 use super::container::{Ending, FileIndex, Messages};
 use serde::Serialize;
 use std::fmt;
@@ -25,6 +26,10 @@ pub struct Loss {
     pub repeated_scans: u64,
     /// Number of duplicate IMU samples, each used once; not a loss.
     pub repeated_samples: u64,
+    /// Number of messages dropped because their stamps are far from those before and after; not a loss.
+    pub outlying_stamps: u64,
+    /// Steps of the sensors' clocks, which are removed from the stamps; not a loss.
+    pub clock_steps: Vec<ClockStep>,
 }
 
 impl Loss {
@@ -47,17 +52,25 @@ impl Loss {
 
     /// Whether no data were lost.
     pub fn is_none(&self) -> bool {
-        *self
-            == Self { repeated_scans: self.repeated_scans, repeated_samples: self.repeated_samples, ..Self::default() }
+        let Self { repeated_scans, repeated_samples, outlying_stamps, .. } = *self;
+        let clock_steps = self.clock_steps.clone();
+        *self == Self { repeated_scans, repeated_samples, outlying_stamps, clock_steps, ..Self::default() }
     }
 
     /// Notes on data skipped without loss, one sentence each.
     pub fn notes(&self) -> Vec<String> {
-        let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} duplicate {what} were ignored"));
-        [counted(self.repeated_scans, "scans"), counted(self.repeated_samples, "IMU samples")]
-            .into_iter()
-            .flatten()
-            .collect()
+        let counted = |count: u64, sentence: &str| (count > 0).then(|| format!("{count} {sentence}"));
+        [
+            counted(self.repeated_scans, "duplicate scans were ignored"),
+            counted(self.repeated_samples, "duplicate IMU samples were ignored"),
+            counted(
+                self.outlying_stamps,
+                "messages were dropped: their stamps are far from those before and after them",
+            ),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
     }
 
     /// Descriptions of the losses, one sentence each.

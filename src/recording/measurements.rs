@@ -6,14 +6,17 @@ use crate::message::scan::Projector;
 use crate::message::{imu, livox, multi_echo, points, scan};
 use crate::pairing::ImuPairing;
 use crate::selection::{ImuDecoding, ImuLayout, LidarDecoding, LidarKind};
+use crate::stamp_screen::StampScreen;
 use crate::stamp_sorter::StampSorter;
 use crate::wire::{DecodeError, Payload};
 use crate::{Loss, Reader, RecordingError, Selection};
 use zsim_base::measurement::{ImuSample, LidarScan, Measurement};
+use zsim_base::time::{Span, Stamp};
 
 /// Reads measurements in order of their stamps, independent of log times.
 ///
-/// Half a second of measurements is queued for sorting, up to 30 s if one sensor is logged later than the other.
+/// Half a second of measurements is queued for sorting, up to 30 s if one sensor is logged later than the other. Messages
+/// with outlying stamps are dropped, and steps of the sensors' clocks removed; both are counted in [`loss`](Self::loss).
 ///
 /// An item is an error only if the file cannot be read further. Unusable messages are skipped and counted in
 /// [`loss`](Self::loss), and so are duplicates.
@@ -42,9 +45,12 @@ pub(super) enum Role {
 
 /// Converts messages to measurements.
 pub(super) struct MeasurementDecoder {
-    lidar: LidarDecoding,
-    imu: ImuDecoding,
+    selection: Selection,
     projector: Projector,
+    scans: StampScreen<LidarScan>,
+    samples: StampScreen<ImuSample>,
+    /// Accelerations that have their own topic.
+    accelerations: StampScreen<ImuSample>,
     pairing: ImuPairing,
 }
 
@@ -105,7 +111,8 @@ impl Measurements<'_> {
             } else {
                 continue;
             };
-            self.decoder.take(role, message.data, &mut self.sorter, &mut self.loss);
+            let log = Stamp::from_nanos(i64::try_from(message.log_time_ns).unwrap_or(i64::MAX));
+            self.decoder.take(role, Some(log), message.data, &mut self.sorter, &mut self.loss);
             return Ok(true);
         }
     }
@@ -114,55 +121,109 @@ impl Measurements<'_> {
 impl MeasurementDecoder {
     pub(super) fn new(selection: &Selection) -> Self {
         Self {
-            lidar: selection.lidar,
-            imu: selection.imu.clone(),
+            selection: selection.clone(),
             projector: Projector::default(),
+            scans: StampScreen::default(),
+            samples: StampScreen::default(),
+            accelerations: StampScreen::default(),
             pairing: ImuPairing::default(),
         }
     }
 
-    /// Decodes a message and queues its measurement; a message that is not usable is counted.
-    pub(super) fn take(&mut self, role: Role, message: Payload<'_>, sorter: &mut StampSorter, loss: &mut Loss) {
+    /// Decodes a message logged at `log` and queues the measurements that are no longer in doubt.
+    ///
+    /// Without log times no steps of the clocks are removed. A message that is not usable is counted in `loss`.
+    pub(super) fn take(
+        &mut self,
+        role: Role,
+        log: Option<Stamp>,
+        message: Payload<'_>,
+        sorter: &mut StampSorter,
+        loss: &mut Loss,
+    ) {
         if role == Role::Lidar {
-            match self.lidar.decode(message, &mut self.projector) {
-                Ok(scan) => sorter.put(Measurement::Lidar(scan)),
+            match self.selection.lidar.decode(message, &mut self.projector) {
+                Ok(scan) => self.scan(log, scan, sorter),
                 Err(_) => loss.unreadable_messages += 1,
             }
-            return;
+        } else {
+            match imu::decode(message, self.selection.imu.unit) {
+                Ok(sample) if !imu::is_finite(&sample) => loss.samples_not_finite += 1,
+                Ok(sample) => self.sample(log, sample, role == Role::Imu, sorter),
+                Err(_) => loss.unreadable_messages += 1,
+            }
         }
-        match imu::decode(message, self.imu.unit) {
-            Ok(sample) if !imu::is_finite(&sample) => loss.samples_not_finite += 1,
-            Ok(sample) => self.imu_sample(sample, role == Role::Imu, sorter),
-            Err(_) => loss.unreadable_messages += 1,
+        self.report(loss);
+    }
+
+    fn scan(&mut self, log: Option<Stamp>, scan: LidarScan, sorter: &mut StampSorter) {
+        let other = self.samples.steps.last().copied();
+        let header = scan.stamp + scan.stamped_after;
+        self.scans.push((log.unwrap_or(header), header), scan, other, &mut |scan, shift| put_scan(scan, shift, sorter));
+    }
+
+    /// Takes a sample of the IMU topic (`is_imu`) or of the acceleration topic.
+    fn sample(&mut self, log: Option<Stamp>, sample: ImuSample, is_imu: bool, sorter: &mut StampSorter) {
+        let Self { selection, pairing, scans, samples, accelerations, .. } = self;
+        let screen = if is_imu { samples } else { accelerations };
+        let other = scans.steps.last().copied();
+        let mut accept = |sample, shift| put_sample(sample, shift, is_imu, &selection.imu, pairing, sorter);
+        screen.push((log.unwrap_or(sample.stamp), sample.stamp), sample, other, &mut accept);
+    }
+
+    /// Writes the counts of outliers and the steps to `loss`.
+    fn report(&self, loss: &mut Loss) {
+        loss.outlying_stamps = self.scans.outliers + self.samples.outliers + self.accelerations.outliers;
+        if self.scans.steps.len() + self.samples.steps.len() != loss.clock_steps.len() {
+            let Selection { lidar_topic, imu_topic, imu, .. } = &self.selection;
+            let steps = self.scans.clock_steps(lidar_topic, Span::ZERO);
+            loss.clock_steps = steps.chain(self.samples.clock_steps(imu_topic, imu.shift)).collect();
         }
     }
 
-    /// Processes a message of the IMU topic (`is_imu`) or of the acceleration topic.
-    fn imu_sample(&mut self, mut sample: ImuSample, is_imu: bool, sorter: &mut StampSorter) {
-        sample.stamp += self.imu.shift;
-        let ImuLayout::Separate { acceleration_topic, max_separation } = &self.imu.layout else {
-            return sorter.put(Measurement::Imu(sample));
-        };
-        let (rate, force) = (sample.angular_velocity_rad_per_s, sample.specific_force_m_per_s2);
-        let in_one_topic = acceleration_topic.is_none();
-        if is_imu && rate.iter().any(|x| *x != 0.0) {
-            self.pairing.put_rate(sample.stamp, rate);
+    /// Queues the remaining measurements.
+    fn finish(&mut self, sorter: &mut StampSorter, loss: &mut Loss) {
+        let Self { selection, pairing, scans, samples, accelerations, .. } = self;
+        scans.finish(&mut |scan, shift| put_scan(scan, shift, sorter));
+        for (screen, is_imu) in [(samples, true), (accelerations, false)] {
+            screen.finish(&mut |sample, shift| put_sample(sample, shift, is_imu, &selection.imu, pairing, sorter));
         }
-        if (in_one_topic || !is_imu) && force.iter().any(|x| *x != 0.0) {
-            self.pairing.put_force(sample.stamp, force);
-        }
-        while let Some(pair) = self.pairing.take(*max_separation, false) {
-            sorter.put(Measurement::Imu(pair));
-        }
-    }
-
-    /// Queues the remaining pairs.
-    fn finish(&mut self, sorter: &mut StampSorter) {
-        if let ImuLayout::Separate { max_separation, .. } = &self.imu.layout {
-            while let Some(pair) = self.pairing.take(*max_separation, true) {
+        if let ImuLayout::Separate { max_separation, .. } = &selection.imu.layout {
+            while let Some(pair) = pairing.take(*max_separation, true) {
                 sorter.put(Measurement::Imu(pair));
             }
         }
+        self.report(loss);
+    }
+}
+
+fn put_scan(scan: LidarScan, shift: Span, sorter: &mut StampSorter) {
+    sorter.put(Measurement::Lidar(LidarScan { stamp: scan.stamp - shift, ..scan }));
+}
+
+/// Queues a sample of the IMU topic (`is_imu`) or of the acceleration topic, or the pairs that it completes.
+fn put_sample(
+    mut sample: ImuSample,
+    shift: Span,
+    is_imu: bool,
+    decoding: &ImuDecoding,
+    pairing: &mut ImuPairing,
+    sorter: &mut StampSorter,
+) {
+    sample.stamp = sample.stamp - shift + decoding.shift;
+    let ImuLayout::Separate { acceleration_topic, max_separation } = &decoding.layout else {
+        return sorter.put(Measurement::Imu(sample));
+    };
+    let (rate, force) = (sample.angular_velocity_rad_per_s, sample.specific_force_m_per_s2);
+    let in_one_topic = acceleration_topic.is_none();
+    if is_imu && rate.iter().any(|x| *x != 0.0) {
+        pairing.put_rate(sample.stamp, rate);
+    }
+    if (in_one_topic || !is_imu) && force.iter().any(|x| *x != 0.0) {
+        pairing.put_force(sample.stamp, force);
+    }
+    while let Some(pair) = pairing.take(*max_separation, false) {
+        sorter.put(Measurement::Imu(pair));
     }
 }
 
@@ -186,7 +247,7 @@ impl Iterator for Measurements<'_> {
                 Ok(true) => {}
                 Ok(false) => {
                     self.ended = true;
-                    self.decoder.finish(&mut self.sorter);
+                    self.decoder.finish(&mut self.sorter, &mut self.loss);
                 }
                 Err(error) => {
                     self.ended = true;

@@ -2,8 +2,10 @@
 
 use crate::container::{ChannelId, Messages, RawMessage};
 use crate::message::{clock, pose};
+use crate::stamp_screen::StampScreen;
 use crate::topics::Topic;
 use crate::{Loss, Reader, RecordingError};
+use std::collections::VecDeque;
 use zsim_base::geometry::{Pose, Trajectory};
 use zsim_base::time::Stamp;
 use zsim_truth::ClockTruth;
@@ -19,15 +21,20 @@ pub enum Truth {
     Clock(Stamp, ClockTruth),
 }
 
-/// Reads ground truth in the order in which it was written.
+/// Reads ground truth in the order in which it was written, without the steps of the lidar's clock.
 pub struct TruthReader<'r> {
     messages: Messages<'r>,
     heads: Vec<ChannelId>,
     bases: Vec<ChannelId>,
     clocks: Vec<ChannelId>,
     lidar: Option<clock::ClockReading<'static>>,
+    head_stamps: StampScreen<(Stamp, Pose)>,
+    base_stamps: StampScreen<(Stamp, Pose)>,
+    ready: VecDeque<Truth>,
     loss: Loss,
     expected: Option<u64>,
+    /// Whether all messages are read.
+    at_end: bool,
     ended: bool,
 }
 
@@ -43,8 +50,12 @@ impl Reader {
             bases,
             clocks,
             lidar: None,
+            head_stamps: StampScreen::default(),
+            base_stamps: StampScreen::default(),
+            ready: VecDeque::new(),
             loss: self.loss().clone(),
             expected: self.expected_messages(),
+            at_end: false,
         }
     }
 
@@ -71,29 +82,36 @@ impl TruthReader<'_> {
     }
 
     fn next_truth(&mut self) -> Result<Option<Truth>, RecordingError> {
-        loop {
-            let Some(message) = self.messages.next()? else {
-                self.loss.add_pass(&self.messages, self.expected);
-                return Ok(None);
-            };
-            let decode_pose = |truth: fn(Stamp, Pose) -> Truth| {
-                pose::decode(message.data).map(|(stamp, pose)| Some(truth(stamp, pose))).ok()
-            };
-            let read = if self.heads.contains(&message.channel) {
-                decode_pose(Truth::Head)
-            } else if self.bases.contains(&message.channel) {
-                decode_pose(Truth::Base)
-            } else if self.clocks.contains(&message.channel) {
-                pair(&mut self.lidar, &message)
-            } else {
-                continue;
-            };
-            match read {
-                Some(Some(truth)) => return Ok(Some(truth)),
-                Some(None) => {}
-                None => self.loss.unreadable_messages += 1,
-            }
+        while self.ready.is_empty() && !self.at_end {
+            self.step()?;
         }
+        Ok(self.ready.pop_front())
+    }
+
+    /// Reads a message and adds the truths that are no longer in doubt to `ready`.
+    fn step(&mut self) -> Result<(), RecordingError> {
+        let Self { ready, head_stamps, base_stamps, .. } = self;
+        let Some(message) = self.messages.next()? else {
+            head_stamps.finish(&mut |(stamp, pose), shift| ready.push_back(Truth::Head(stamp - shift, pose)));
+            base_stamps.finish(&mut |(stamp, pose), shift| ready.push_back(Truth::Base(stamp - shift, pose)));
+            self.loss.add_pass(&self.messages, self.expected);
+            self.at_end = true;
+            return Ok(());
+        };
+        let log = Stamp::from_nanos(i64::try_from(message.log_time_ns).unwrap_or(i64::MAX));
+        let is_read = if self.heads.contains(&message.channel) {
+            let accept = &mut |(stamp, pose), shift| ready.push_back(Truth::Head(stamp - shift, pose));
+            pose::decode(message.data).map(|read| head_stamps.push((log, read.0), read, None, accept)).is_ok()
+        } else if self.bases.contains(&message.channel) {
+            let accept = &mut |(stamp, pose), shift| ready.push_back(Truth::Base(stamp - shift, pose));
+            pose::decode(message.data).map(|read| base_stamps.push((log, read.0), read, None, accept)).is_ok()
+        } else if self.clocks.contains(&message.channel) {
+            pair(&mut self.lidar, &message).map(|clock| ready.extend(clock)).is_some()
+        } else {
+            true
+        };
+        self.loss.unreadable_messages += u64::from(!is_read);
+        Ok(())
     }
 }
 

@@ -112,8 +112,15 @@ pub(super) fn run_open_loop(
     watch.data(StageData::Poses(&result.poses));
     let PoseOutput { map_from_head, covariances, radii_m, .. } = poses;
 
-    // The reported offsets relate to the recorded stamps, without the shift that the selection applies.
+    // The reported offsets relate to the recorded stamps, without the shift that the selection applies and with the steps of
+    // the clocks, which the reader removes.
     let shift_s = selection.imu_shift().seconds();
+    let stepped_s = |at: Stamp| {
+        let before = loss.clock_steps.iter().filter(|step| step.at <= at);
+        before
+            .map(|step| if step.topic == selection.imu_topic { step.by } else { Span::ZERO - step.by }.seconds())
+            .sum::<f64>()
+    };
     let mut events = Events::default();
     loss.sentences().into_iter().for_each(|sentence| events.add_loss("recording", sentence));
     inputs.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
@@ -121,6 +128,7 @@ pub(super) fn run_open_loop(
     result.located.iter().for_each(|located| events.add_note("located", located_message(located)));
     loss.notes().into_iter().for_each(|sentence| events.add_note("recording", sentence));
     let start = inputs.start();
+    events.add_clock_steps(&loss.clock_steps, start);
     events.add_warnings(&result.warnings, start);
     Ok(OpenLoopRun {
         map_from_head,
@@ -128,7 +136,7 @@ pub(super) fn run_open_loop(
         radii_m,
         aligned_covariances: result.aligned_covariances,
         timing: result.windows.iter().map(|window| window.timing).sum(),
-        clock_offsets: result.clock_offsets.into_iter().map(|(at, offset_s)| (at, offset_s - shift_s)).collect(),
+        clock_offsets: result.clock_offsets.into_iter().map(|(at, s)| (at, s - shift_s + stepped_s(at))).collect(),
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
         events,

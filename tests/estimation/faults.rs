@@ -225,10 +225,30 @@ fn gaps_and_frozen_sensors_are_reported() {
             &["lidar_gap", "repeated_scans"],
             Some((0.005, 0.15)),
         ),
-        ("clock jump", "(sensor: both, from_s: 6, fault: clock_jump(jump_s: 86400))", &["gap"], Some((0.003, 0.2))),
     ] {
         check(&Case { name, faults, code: 3, within, is_lost: within.is_none(), stated, ..CASE });
     }
+}
+
+/// Without a correction a step of both clocks was a gap, and one of the IMU's was lost or erred by centimetres.
+#[test]
+fn steps_of_the_clocks_are_removed_and_named() {
+    for (name, faults, within) in [
+        ("both, a day", "(sensor: both, from_s: 6, fault: clock_jump(jump_s: 86400))", (0.003, 0.2)),
+        ("IMU, 1 s", "(sensor: imu, from_s: 6, fault: clock_jump(jump_s: 1))", (0.003, 0.2)),
+        ("IMU, 1 s back", "(sensor: imu, from_s: 6, fault: clock_jump(jump_s: -1))", (0.003, 0.2)),
+        (
+            "lidar, 0.4 s; delays",
+            "(sensor: lidar, from_s: 6, fault: clock_jump(jump_s: 0.4)), (sensor: imu, fault: delay(mean_s: 0.003))",
+            (0.004, 0.25),
+        ),
+    ] {
+        check(&Case { name, faults, within: Some(within), stated: &["clock_step"], ..CASE });
+    }
+    let both = "(sensor: both, from_s: 6, fault: clock_jump(jump_s: 37))";
+    let case =
+        Case { name: "cloud, 37 s", faults: both, lidar: "vlp16", duration_s: 10, stated: &["clock_step"], ..CASE };
+    check(&Case { within: Some((0.005, 0.2)), ..case });
 }
 
 /// The first two cases were lost before the sensor was judged again after a gap, the third before relocalisation counted the

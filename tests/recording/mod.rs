@@ -13,6 +13,7 @@ mod programs;
 pub mod readers;
 mod result;
 mod round_trip;
+mod stamps;
 
 use proptest::test_runner::{Config, FileFailurePersistence};
 
