@@ -5,6 +5,7 @@ use crate::skip;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use zsim::report::Metrics;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -77,7 +78,25 @@ fn a_full_run_writes_all_files_independent_of_the_number_of_threads() {
     let written = std::fs::read_to_string(here.path().join("run/metrics.json")).unwrap();
     let written: Value = serde_json::from_str(&written).unwrap();
     assert_eq!(written["open_loop"], one["open_loop"]);
+    the_verdict_is_that_of_the_bounds(&here.path().join("run"));
     metrics_alone_are_those_of_the_whole_estimate(here.path(), &one);
+}
+
+/// The verdict states the error, and the median and the maximum of the bounds of all poses.
+fn the_verdict_is_that_of_the_bounds(folder: &Path) {
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let bound_m = |row: &str| -> f64 { row.split(',').nth(1).unwrap().parse().unwrap() };
+    let mut bounds_m: Vec<f64> = read("integrity.csv").lines().skip(1).map(bound_m).collect();
+    bounds_m.sort_by(f64::total_cmp);
+    let (median_m, largest_m) = (bounds_m[bounds_m.len() / 2], bounds_m[bounds_m.len() - 1]);
+    let metrics: Metrics = serde_json::from_str(&read("metrics.json")).unwrap();
+    let rmse_m = metrics.closed_loop.position_rmse_m.unwrap();
+    // Three significant digits.
+    let mm = |m: f64| format!("{:.*} mm", (2.0 - (1e3 * m).log10().floor()).max(0.0) as usize, 1e3 * m);
+    let verdict =
+        format!("verdict: good: RMSE {}; 99 % bound: median {}, at most {}", mm(rmse_m), mm(median_m), mm(largest_m));
+    let brief = zsim::report::brief(&metrics);
+    assert!(brief.contains(&verdict), "{verdict}\n{brief}");
 }
 
 /// Without cloud, result, plots and page the trajectories and all metrics but those of the cloud are the same.
