@@ -190,8 +190,11 @@ pub struct FilterMetrics {
     pub dropped_isolated: Option<u64>,
     /// Removed returns from moving objects.
     pub dropped_moving: Option<u64>,
-    /// Standard deviation of the signed distance of all points in the cloud files, returns from moving objects included, m.
-    pub kept_sigma_m: Option<f64>,
+    /// Standard deviation of the signed distance of the points in the cloud files that are on static surfaces, m: those of
+    /// `sigma_m` that the filter keeps.
+    pub kept_static_sigma_m: Option<f64>,
+    /// The same of all points in the cloud files, also of those on the carrier and on moving objects that the filter keeps, m.
+    pub kept_all_sigma_m: Option<f64>,
     /// Fraction of the returns from static surfaces that the filter removed by mistake.
     pub standing_dropped_fraction: Option<f64>,
     /// Fraction of the returns from moving objects that the filter removed.
@@ -277,7 +280,8 @@ mod tests {
         "dropped_mixed",
         "dropped_isolated",
         "dropped_moving",
-        "kept_sigma_m",
+        "kept_static_sigma_m",
+        "kept_all_sigma_m",
         "standing_dropped_fraction",
         "movers_dropped_fraction",
         "integrity",

@@ -144,7 +144,8 @@ fn cloud(metrics: &Metrics) -> Group {
     rows.add("removed: moving", fraction(m.filter.dropped_moving), percent);
     rows.add("static points removed by mistake", m.filter.standing_dropped_fraction, percent);
     rows.add("moving points removed", m.filter.movers_dropped_fraction, percent);
-    rows.add("sigma, all points in the file", m.filter.kept_sigma_m, length);
+    rows.add("sigma, static points in the file", m.filter.kept_static_sigma_m, length);
+    rows.add("sigma, all points in the file", m.filter.kept_all_sigma_m, length);
     rows.titled("cloud")
 }
 

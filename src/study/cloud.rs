@@ -109,7 +109,7 @@ pub(super) fn cloud_metrics(
     }
 }
 
-/// Metrics of the filter for returns from static surfaces and from moving objects, and of all points that remain.
+/// Metrics of the filter for returns from static surfaces and from moving objects, and of the points that remain.
 fn evaluated_filter<'a>(
     registered: &'a RegisteredCloud,
     targets: &'a [Target],
@@ -125,7 +125,8 @@ fn evaluated_filter<'a>(
         (all > 0).then(|| (all - remaining) as f64 / all as f64)
     };
     FilterMetrics {
-        kept_sigma_m: errors(&mut registered.sample.iter().filter(kept)).map(|cloud| cloud.sigma_m),
+        kept_static_sigma_m: errors(&mut of(Target::Static).filter(kept)).map(|cloud| cloud.sigma_m),
+        kept_all_sigma_m: errors(&mut registered.sample.iter().filter(kept)).map(|cloud| cloud.sigma_m),
         standing_dropped_fraction: dropped(Target::Static),
         movers_dropped_fraction: dropped(Target::Mover),
         ..filter_metrics(&registered.class_counts)
@@ -231,7 +232,8 @@ mod tests {
         assert_eq!((metrics.filter.kept, metrics.filter.dropped_moving), (Some(16), Some(4)));
         assert_eq!(metrics.filter.standing_dropped_fraction, Some(0.0));
         assert_eq!(metrics.filter.movers_dropped_fraction, Some(1.0));
-        assert_relative_eq!(metrics.filter.kept_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
+        assert_relative_eq!(metrics.filter.kept_static_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
+        assert_relative_eq!(metrics.filter.kept_all_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
         // A beam on the operator that remains, 0.5 m above the floor, is an error of the cloud: 16 points with a mean of
         // 0.01 m and a standard deviation of 0.03 m, and one at 0.51 m.
         let mut registered = registered;
@@ -239,7 +241,8 @@ mod tests {
         let metrics = cloud_metrics(&registered, Some(&Pose::identity()), Some(surroundings));
         let mean = (16.0 * 0.01 + 0.51) / 17.0;
         let square = (16.0 * (0.01_f64.powi(2) + 0.03_f64.powi(2)) + 0.51_f64.powi(2)) / 17.0;
-        assert_relative_eq!(metrics.filter.kept_sigma_m.unwrap(), (square - mean * mean).sqrt(), epsilon = 1e-6);
+        assert_relative_eq!(metrics.filter.kept_static_sigma_m.unwrap(), 0.03, epsilon = 1e-6);
+        assert_relative_eq!(metrics.filter.kept_all_sigma_m.unwrap(), (square - mean * mean).sqrt(), epsilon = 1e-6);
         let unfiltered = cloud_metrics(&RegisteredCloud { filtered: false, ..registered }, None, None);
         assert_eq!((unfiltered.points, unfiltered.filter), (Some(20), FilterMetrics::default()));
     }

@@ -10,8 +10,10 @@ use std::process::Command;
 fn the_page_works_in_a_browser_and_a_hostile_scene_name_is_inert() {
     let here = tempfile::tempdir().unwrap();
     let scene = hostile_scene(here.path());
-    let (code, _, errors) =
-        run(here.path(), &format!("--quiet --scene {} --lidar lms291 --duration 8s --seed 3 --out out", scene.display()));
+    let (code, _, errors) = run(
+        here.path(),
+        &format!("--quiet --scene {} --lidar lms291 --duration 8s --seed 3 --out out", scene.display()),
+    );
     assert!(code == 0 || code == 3, "{errors}");
     let report = here.path().join("out/report.html");
     assert!(std::fs::read_to_string(&report).unwrap().contains("&lt;script&gt;window.hostile"));
