@@ -1,10 +1,11 @@
 //! The ground floor of zsim: what every other room may use.
 //!
-//! Stamps ([time]), [random] streams, [geometry], [signal] analysis, [spec] files, [measurement]s and the persistent
-//! [surfel_map]. No simulator, no estimator, no recordings.
+//! Stamps ([time]), [random] streams, [geometry], [signal] analysis, [spec] files, [ply] files, [measurement]s and the
+//! persistent [surfel_map]. No simulator, no estimator, no recordings.
 
 pub mod geometry;
 pub mod measurement;
+pub mod ply;
 pub mod random;
 pub mod signal;
 pub mod spec;

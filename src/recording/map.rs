@@ -2,12 +2,13 @@
 //!
 //! `docs/guide/maps.md` documents the format.
 
-use super::ply::header::{self, Header, PlyFormat, Problem, Property, Scalar};
+use super::ply::points;
 use crate::RecordingError;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write};
+use std::io::{BufRead, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
 use zsim_base::geometry::{Matrix, Vector};
+use zsim_base::ply::{Header, PlyFormat, PlyReader, Problem, Property, PropertyKind, Scalar};
 use zsim_base::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
 
 /// Version of the file format.
@@ -66,8 +67,7 @@ pub fn read_surfel_map(path: &Path) -> Result<SurfelMap, RecordingError> {
 /// When it is not a surfel map of zsim, has another version, is truncated or too long, fails its checksum, or contains
 /// an invalid surfel.
 pub fn parse_surfel_map(name: &str, input: impl Read) -> Result<SurfelMap, RecordingError> {
-    let mut input = BufReader::with_capacity(1 << 16, input);
-    read(&mut input).map_err(|(line, problem)| RecordingError::Line { name: name.to_owned(), line, problem })
+    read(input).map_err(|(line, problem)| RecordingError::Line { name: name.to_owned(), line, problem })
 }
 
 /// Content of the header comments.
@@ -75,18 +75,20 @@ struct MapHeader {
     finest_voxel_m: f64,
     levels: usize,
     checksum: u32,
+    count: u64,
 }
 
-fn read(input: &mut impl BufRead) -> Result<SurfelMap, Problem> {
-    let header = header::read(input)?;
-    let map_header = parse_header(&header)?;
-    let mut checksum = start_checksum(map_header.finest_voxel_m, map_header.levels, header.count);
+fn read(input: impl Read) -> Result<SurfelMap, Problem> {
+    let mut file = PlyReader::new(input)?;
+    let map_header = parse_header(file.header())?;
+    let (count, end) = (map_header.count, file.header().lines + 1);
+    let mut checksum = start_checksum(map_header.finest_voxel_m, map_header.levels, count);
     let mut surfels = Vec::new();
-    let end = header.lines + 1;
-    for index in 0..header.count {
+    let input = file.input();
+    for index in 0..count {
         let mut row = [0; ROW_BYTES];
         input.read_exact(&mut row).map_err(|error| match error.kind() {
-            ErrorKind::UnexpectedEof => (end, format!("the file ends {} surfels early", header.count - index)),
+            ErrorKind::UnexpectedEof => (end, format!("the file ends {} surfels early", count - index)),
             _ => (end, error.to_string()),
         })?;
         checksum.update(&row);
@@ -94,7 +96,7 @@ fn read(input: &mut impl BufRead) -> Result<SurfelMap, Problem> {
     }
     let rest = input.fill_buf().map_err(|error| (end, error.to_string()))?;
     if !rest.is_empty() {
-        return Err((end, format!("the file has data after its {} surfels", header.count)));
+        return Err((end, format!("the file has data after its {count} surfels")));
     }
     if checksum.finalize() != map_header.checksum {
         return Err((end, "the file is damaged: its checksum does not match".to_owned()));
@@ -104,6 +106,7 @@ fn read(input: &mut impl BufRead) -> Result<SurfelMap, Problem> {
 }
 
 fn parse_header(header: &Header) -> Result<MapHeader, Problem> {
+    let surfels = points(header)?;
     let problem = |problem: String| (header.lines, problem);
     let find = |key: &str| header.comments.iter().find_map(|comment| comment.strip_prefix(key));
     let Some(version) = find(TITLE) else {
@@ -115,8 +118,9 @@ fn parse_header(header: &Header) -> Result<MapHeader, Problem> {
         return Err(problem(format!("the map has version {version}; this program reads version {VERSION}")));
     }
     let expected = PROPERTIES.iter().map(|name| (*name, Scalar::Double)).chain([(LEVEL, Scalar::Unsigned(1))]);
-    let expected: Vec<Property> = expected.map(|(name, scalar)| Property { name: name.to_owned(), scalar }).collect();
-    if header.format != PlyFormat::LittleEndian || header.properties != expected {
+    let expected: Vec<Property> =
+        expected.map(|(name, scalar)| Property { name: name.to_owned(), kind: PropertyKind::Number(scalar) }).collect();
+    if header.format != PlyFormat::LittleEndian || surfels.properties != expected {
         return Err(problem("the properties are not those of surfels".to_owned()));
     }
     let number = |key: &str| {
@@ -129,6 +133,7 @@ fn parse_header(header: &Header) -> Result<MapHeader, Problem> {
         finest_voxel_m: voxel.parse().map_err(|_| invalid("finest_voxel_m ", voxel))?,
         levels: levels.parse().map_err(|_| invalid("levels ", levels))?,
         checksum: u32::from_str_radix(checksum, 16).map_err(|_| invalid("crc32 ", checksum))?,
+        count: surfels.count,
     })
 }
 

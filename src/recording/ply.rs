@@ -2,12 +2,27 @@
 //!
 //! A PLY file is a text header that declares elements and their properties, followed by the elements (Turk 1994).
 
-pub(super) mod header;
 mod reader;
 mod writer;
 
 pub use reader::PlyReader;
 pub use writer::PlyWriter;
+
+use zsim_base::ply::{Element, Header, Problem, PropertyKind};
+
+/// Returns the points of a file: its first element, `vertex`, whose properties are numbers.
+pub(super) fn points(header: &Header) -> Result<&Element, Problem> {
+    let problem = |problem: &str| (header.lines, problem.to_owned());
+    let element = header.elements.first().ok_or_else(|| problem("there is no element `vertex`"))?;
+    if element.name != "vertex" {
+        return Err(problem("the first element is not `vertex`"));
+    }
+    let is_number = |kind: &PropertyKind| matches!(kind, PropertyKind::Number(_));
+    match element.properties.iter().all(|property| is_number(&property.kind)) {
+        true => Ok(element),
+        false => Err(problem("list properties of points are not supported")),
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -82,7 +97,7 @@ mod tests {
         assert_eq!(message(start.to_owned()), "a.ply:6: the header does not end");
         let start = format!("{start}property float z\nend_header\n");
         assert_eq!(message(format!("{start}1 2 3\n")), "a.ply:9: the file ends 1 points early");
-        assert_eq!(message(format!("{start}1 2\n")), "a.ply:8: a point needs 3 numbers, but the line has 2");
+        assert_eq!(message(format!("{start}1 2\n")), "a.ply:8: a `vertex` needs 3 numbers, but the line has 2");
         assert_eq!(message(format!("{start}1 2 nan\n")), "a.ply:8: the point is not finite");
         let short = &written(2)[..];
         assert!(read(&short[..short.len() - 1]).unwrap_err().ends_with("the file ends 1 points early"));

@@ -1,20 +1,18 @@
-use super::header::{self, PlyFormat, Property};
 use crate::{CloudPoint, RecordingError};
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 use std::path::Path;
+use zsim_base::ply::{self, Element, Failure, PlyFormat, Row};
 use zsim_base::time::{Span, Stamp};
 
 /// Reads the points of a cloud sequentially.
 pub struct PlyReader<R: Read> {
     name: String,
-    input: BufReader<R>,
-    format: PlyFormat,
+    file: ply::PlyReader<R>,
+    points: Element,
     columns: Columns,
-    properties: Vec<Property>,
     remaining: u64,
-    line: usize,
-    row: Vec<f64>,
+    row: Row,
 }
 
 /// Indices of a point's properties in a row.
@@ -45,18 +43,12 @@ impl<R: Read> PlyReader<R> {
     /// # Errors
     /// When the header is not that of a point cloud.
     pub fn new(name: &str, input: R) -> Result<Self, RecordingError> {
-        let mut input = BufReader::with_capacity(1 << 16, input);
-        let header = header::read(&mut input).map_err(|(line, problem)| RecordingError::Line {
-            name: name.to_owned(),
-            line,
-            problem,
-        })?;
-        let find = |names: &[&str]| {
-            names.iter().find_map(|name| header.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name)))
-        };
+        let wrong = |(line, problem)| RecordingError::Line { name: name.to_owned(), line, problem };
+        let file = ply::PlyReader::new(input).map_err(wrong)?;
+        let points = super::points(file.header()).map_err(wrong)?.clone();
+        let find = |names: &[&str]| points.property(names);
         let (Some(x), Some(y), Some(z)) = (find(&["x"]), find(&["y"]), find(&["z"])) else {
-            let problem = "the points have no properties x, y and z".to_owned();
-            return Err(RecordingError::Line { name: name.to_owned(), line: header.lines, problem });
+            return Err(wrong((file.header().lines, "the points have no properties x, y and z".to_owned())));
         };
         let columns = Columns {
             position: [x, y, z],
@@ -64,16 +56,8 @@ impl<R: Read> PlyReader<R> {
             time: find(&["time", "gps_time", "timestamp", "scalar_gpstime"]),
             error: find(&["error"]),
         };
-        Ok(Self {
-            name: name.to_owned(),
-            input,
-            format: header.format,
-            columns,
-            properties: header.properties,
-            remaining: header.count,
-            line: header.lines,
-            row: Vec::new(),
-        })
+        let remaining = points.count;
+        Ok(Self { name: name.to_owned(), file, points, columns, remaining, row: Row::default() })
     }
 
     /// Number of points not yet read, according to the header.
@@ -82,58 +66,31 @@ impl<R: Read> PlyReader<R> {
     }
 
     fn next_point(&mut self) -> Result<CloudPoint, String> {
-        match self.format {
-            PlyFormat::Ascii => self.read_line()?,
-            PlyFormat::LittleEndian => self.read_binary(false)?,
-            PlyFormat::BigEndian => self.read_binary(true)?,
-        }
-        let number = |column: Option<usize>| column.and_then(|column| self.row.get(column).copied());
-        let [x, y, z] = self.columns.position.map(|column| number(Some(column)).unwrap_or(f64::NAN) as f32);
+        self.file.read(&self.points, &mut self.row).map_err(|failure| match failure {
+            Failure::End => format!("the file ends {} points early", self.remaining),
+            Failure::Problem(problem) => problem,
+        })?;
+        let number = |column: Option<usize>, missing: f64| column.map_or(missing, |column| self.row.number(column));
+        let [x, y, z] = self.columns.position.map(|column| self.row.number(column) as f32);
         let point_in_map = nalgebra::Vector3::new(x, y, z);
         if !point_in_map.iter().all(|c| c.is_finite()) {
             return Err("the point is not finite".to_owned());
         }
         Ok(CloudPoint {
             point_in_map,
-            intensity: number(self.columns.intensity).unwrap_or(0.0) as f32,
-            stamp: Stamp::from_nanos(0) + Span::from_seconds(number(self.columns.time).unwrap_or(0.0)),
-            error_m: number(self.columns.error).unwrap_or(f64::NAN) as f32,
+            intensity: number(self.columns.intensity, 0.0) as f32,
+            stamp: Stamp::from_nanos(0) + Span::from_seconds(number(self.columns.time, 0.0)),
+            error_m: number(self.columns.error, f64::NAN) as f32,
         })
     }
 
-    fn read_binary(&mut self, big_endian: bool) -> Result<(), String> {
-        self.row.clear();
-        for property in &self.properties {
-            let mut word = [0; 8];
-            let bytes = &mut word[..property.scalar.size()];
-            self.input.read_exact(bytes).map_err(|_| format!("the file ends {} points early", self.remaining))?;
-            if big_endian {
-                bytes.reverse();
-            }
-            self.row.push(property.scalar.number(word));
+    /// Line of the point that was read last, for messages; in a binary file each point counts as one.
+    fn line(&self) -> usize {
+        let header = self.file.header();
+        match header.format {
+            PlyFormat::Ascii => self.file.line(),
+            _ => header.lines + usize::try_from(self.points.count - self.remaining).unwrap_or(usize::MAX),
         }
-        Ok(())
-    }
-
-    fn read_line(&mut self) -> Result<(), String> {
-        self.row.clear();
-        let mut text = Vec::new();
-        let read = (&mut self.input).take(header::MAX_LINE_BYTES).read_until(b'\n', &mut text);
-        if read.map_err(|error| error.to_string())? == 0 {
-            return Err(format!("the file ends {} points early", self.remaining));
-        }
-        let text = std::str::from_utf8(&text).map_err(|_| "this is not text".to_owned())?;
-        for word in text.split_whitespace() {
-            self.row.push(word.parse().map_err(|_| format!("`{word}` is not a number"))?);
-        }
-        if self.row.len() < self.properties.len() {
-            return Err(format!(
-                "a point needs {} numbers, but the line has {}",
-                self.properties.len(),
-                self.row.len()
-            ));
-        }
-        Ok(())
     }
 }
 
@@ -144,10 +101,9 @@ impl<R: Read> Iterator for PlyReader<R> {
         if self.remaining == 0 {
             return None;
         }
-        self.line += 1;
         let point = self.next_point();
         self.remaining = if point.is_ok() { self.remaining - 1 } else { 0 };
-        let (name, line) = (&self.name, self.line);
+        let (name, line) = (&self.name, self.line());
         Some(point.map_err(|problem| RecordingError::Line { name: name.clone(), line, problem }))
     }
 }
