@@ -65,13 +65,14 @@ const BELOW_CLI: &[&str] = &[
 ];
 
 /// Crates that are restricted to some rooms, and these rooms.
-const RESTRICTED_CRATES: [(&str, &[&str]); 19] = [
+const RESTRICTED_CRATES: [(&str, &[&str]); 20] = [
     ("anyhow", &["cli"]),
-    ("base64", &["report"]),
+    ("base64", &["report", "world"]),
     ("cdr", &["recording"]),
     ("clap", &["cli"]),
     ("clap_mangen", &["cli"]),
     ("csv", &["study"]),
+    ("earcut", &["world"]),
     ("httparse", &["cli"]),
     ("include_dir", &["base"]),
     ("indicatif", &["cli"]),

@@ -2,25 +2,26 @@
 
 use super::canopy::Canopy;
 use super::caster::Caster;
-use super::import::{self, MeshTriangles};
+use super::error::unknown_name;
+use super::import::MeshTriangles;
+use super::material::one_word;
 use super::meadow::Meadow;
+use super::meshes::{self, MeshFile, Meshes};
 use super::mover::{Mover, Path};
+use super::routes::routes;
 use super::scatter;
 use super::triangle::{MAX_TRIANGLES, Surfaces};
 use super::{
-    CanopySpec, ItemSpec, LengthUnit, Material, MaterialId, MaterialKind, MoverSpec, Placement, ScatterSpec, SceneSpec,
-    ShapeSpec, SwaySpec, WorldError,
+    CanopySpec, ItemSpec, Material, MaterialId, MaterialKind, MoverSpec, Placement, ScatterSpec, SceneSpec, ShapeSpec,
+    SwaySpec, WorldError,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::rc::Rc;
-use zsim_base::geometry::{Pose, Route, Vector};
+use zsim_base::geometry::{Pose, Route};
+use zsim_base::spec::checked::MAX_LENGTH_M;
 use zsim_base::spec::{Source, SpecError};
 
-/// A mesh without a unit that is longer is probably in mm, m.
-const LARGE_MESH_M: f64 = 500.0;
-/// Maximum coordinate of a surface or a route, m: beyond, single precision in the ray search is too coarse.
-const MAX_EXTENT_M: f64 = 100_000.0;
 /// Maximum nesting depth of templates: a guard against a template that contains itself.
 const MAX_DEPTH: usize = 8;
 
@@ -38,16 +39,16 @@ pub(super) struct WorldParts {
 
 /// Builds all parts of a world.
 pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, WorldError> {
+    let material_ids = material_ids(spec, source)?;
     let mut builder = Builder {
         spec,
         source,
-        material_ids: material_ids(spec, source)?,
+        materials_by_word: material_ids.iter().map(|(name, id)| (one_word(name), *id)).collect(),
+        material_ids,
         routes: routes(spec, source)?,
-        meshes: BTreeMap::new(),
+        meshes: Meshes::default(),
         triangle_count: 0,
         solid_count: 0,
-        notes: Vec::new(),
-        mesh_files: BTreeSet::new(),
     };
     let mut static_surfaces = Surfaces::default();
     builder.add_items(&spec.items, &Pose::identity(), 0, &mut static_surfaces)?;
@@ -59,7 +60,7 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
     let canopies: Vec<Vec<Canopy>> =
         spec.canopies.iter().map(|canopy| builder.canopies(canopy)).collect::<Result<_, _>>()?;
     let canopies = canopies.into_iter().flatten().collect();
-    let Builder { routes, notes, mesh_files, .. } = builder;
+    let Builder { routes, meshes: Meshes { notes, files: mesh_files, .. }, .. } = builder;
     let materials = materials(spec);
     Ok(WorldParts { materials, static_surfaces, movers, meadows, canopies, routes, notes, mesh_files })
 }
@@ -95,51 +96,15 @@ fn material_ids<'a>(spec: &'a SceneSpec, source: &Source) -> Result<BTreeMap<&'a
     Ok(spec.materials.keys().zip(0..).map(|(name, id)| (name.as_str(), MaterialId(id))).collect())
 }
 
-fn routes(spec: &SceneSpec, source: &Source) -> Result<BTreeMap<String, Route>, SpecError> {
-    for (name, route) in &spec.routes {
-        let count = route.points_m.len();
-        if count < 2 {
-            let message = format!("the route `{name}` has {count} points; it needs at least 2");
-            return Err(SpecError::about(source, name, message));
-        }
-        if !route.points_m.iter().flatten().all(|x| x.abs() <= MAX_EXTENT_M) {
-            let message = format!("the route `{name}` has a point that is not within 100 km of the origin");
-            return Err(SpecError::about(source, name, message));
-        }
-        if route.points_m.windows(2).any(|pair| pair[0] == pair[1]) {
-            let message = format!("the route `{name}` has the same point twice in a row");
-            return Err(SpecError::about(source, name, message).with_help("to make a walker rest, use the motion"));
-        }
-    }
-    if let Some(name) = &spec.default_route
-        && !spec.routes.contains_key(name)
-    {
-        return Err(unknown_name(source, "route", name, spec.routes.keys()));
-    }
-    let route = |(name, route): (&String, &super::RouteSpec)| {
-        let points_in_world = route.points_m.iter().map(|point| Vector::from(*point)).collect();
-        (name.clone(), Route { points_in_world, closed: route.closed })
-    };
-    Ok(spec.routes.iter().map(route).collect())
-}
-
-/// An error about a name that the scene does not define; lists the names that it defines.
-fn unknown_name<'a>(source: &Source, what: &str, name: &str, known: impl Iterator<Item = &'a String>) -> SpecError {
-    let known: Vec<&str> = known.map(String::as_str).collect();
-    SpecError::about(source, name, format!("the scene has no {what} `{name}`"))
-        .with_help(format!("it has: {}", if known.is_empty() { "none".to_owned() } else { known.join(", ") }))
-}
-
 struct Builder<'a> {
     spec: &'a SceneSpec,
     source: &'a Source,
     material_ids: BTreeMap<&'a str, MaterialId>,
+    materials_by_word: BTreeMap<String, MaterialId>,
     routes: BTreeMap<String, Route>,
-    meshes: BTreeMap<String, Rc<MeshTriangles>>,
+    meshes: Meshes,
     triangle_count: usize,
     solid_count: u32,
-    notes: Vec<String>,
-    mesh_files: BTreeSet<PathBuf>,
 }
 
 impl Builder<'_> {
@@ -153,10 +118,11 @@ impl Builder<'_> {
         for item in items {
             match item {
                 ItemSpec::Solid { shape, material, at_m_deg } => {
-                    let id = self.material_id(material)?;
-                    let local = self.shape(shape)?;
+                    let solid = self.solid(shape, material)?;
                     for pose in self.poses(at_m_deg, material)? {
-                        self.add(&local, id, &(at * pose), into)?;
+                        let at = at * pose;
+                        self.add(&solid, &at, into)?;
+                        self.meshes.note_far(&solid.mesh, solid.file, &at);
                     }
                 }
                 ItemSpec::Place { template, at_m_deg } => {
@@ -248,58 +214,57 @@ impl Builder<'_> {
         Ok(places.iter().map(Placement::world_from_body).collect())
     }
 
-    fn shape(&mut self, shape: &ShapeSpec) -> Result<Rc<MeshTriangles>, WorldError> {
+    fn solid<'s>(&mut self, shape: &'s ShapeSpec, material: &str) -> Result<Solid<'s>, WorldError> {
+        let fallback = self.material_id(material)?;
         let ShapeSpec::Mesh { file, scale, unit, up } = shape else {
             let wrong = |(key, sentence): (&str, String)| SpecError::about(self.source, key, sentence);
-            return Ok(Rc::new(MeshTriangles { triangles: shape.triangles().map_err(wrong)?, without_area: 0 }));
+            let mesh = Rc::new(MeshTriangles::plain(shape.triangles().map_err(wrong)?));
+            return Ok(Solid { mesh, ids: vec![fallback], file: None });
         };
-        let scale = scale * unit.map_or(1.0, LengthUnit::metres);
-        let key = format!("{file} * {scale}, up {up:?}");
-        if let Some(known) = self.meshes.get(&key) {
-            return Ok(Rc::clone(known));
-        }
-        let wrong = |sentence: String| WorldError::Mesh(SpecError::about(self.source, file, sentence));
-        let Some(folder) = &self.source.folder else {
-            return Err(wrong(format!(
-                "the mesh `{file}` needs a folder: a scene without a folder cannot use mesh files"
-            )));
-        };
-        let path = folder.join(file);
-        let mesh = import::read(&path, scale, *up).map_err(|error| wrong(format!("the mesh `{file}` {error}")))?;
-        if mesh.without_area > 0 {
-            let count = mesh.without_area;
-            self.notes.push(format!(
-                "{file}: removed {count} of {} triangles, which have no area",
-                count + mesh.triangles.len()
-            ));
-        }
-        let size_m = mesh.size_m();
-        if unit.is_none() && scale == 1.0 && size_m > LARGE_MESH_M {
-            self.notes.push(format!("{file} is {size_m:.0} m long: if it is drawn in mm, add `unit: mm`"));
-        }
-        self.mesh_files.insert(path);
-        let mesh = Rc::new(mesh);
-        self.meshes.insert(key, Rc::clone(&mesh));
-        Ok(mesh)
+        let mesh = self.meshes.read(&MeshFile { file, scale: *scale, unit: *unit, up: *up }, self.source)?;
+        // An OBJ file has a name with blanks as one word.
+        let id =
+            |name: &String| self.material_ids.get(name.as_str()).or_else(|| self.materials_by_word.get(name)).copied();
+        let ids: Vec<Option<MaterialId>> = mesh.material_names.iter().map(id).collect();
+        self.meshes.note_unknown_materials(file, &mesh, &ids, material);
+        let ids = std::iter::once(fallback).chain(ids.into_iter().map(|id| id.unwrap_or(fallback))).collect();
+        Ok(Solid { mesh, ids, file: Some(file) })
     }
 
-    fn add(&mut self, mesh: &MeshTriangles, id: MaterialId, at: &Pose, into: &mut Surfaces) -> Result<(), SpecError> {
+    fn add(&mut self, solid: &Solid, at: &Pose, into: &mut Surfaces) -> Result<(), SpecError> {
+        let Solid { mesh, ids, .. } = solid;
         self.triangle_count += mesh.triangles.len();
         if self.triangle_count > MAX_TRIANGLES {
             let message = format!("the scene has more than {MAX_TRIANGLES} triangles");
             return Err(SpecError::plain(&self.source.name, message));
         }
-        for triangle in &mesh.triangles {
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
             let corners = triangle.map(|corner| at.rotation * corner + at.translation.vector);
-            if !corners.iter().flatten().all(|x| x.abs() <= MAX_EXTENT_M) {
-                let message = format!("an item extends to more than {} km from the origin", MAX_EXTENT_M / 1000.0);
-                return Err(SpecError::plain(&self.source.name, message).with_help("lengths are metres"));
+            if !corners.iter().flatten().all(|x| x.abs() <= MAX_LENGTH_M) {
+                return Err(self.too_far(solid, at));
             }
             into.triangles.push(corners);
-            into.materials.push(id);
+            into.materials.push(ids[mesh.materials.get(index).map_or(0, |number| usize::from(*number))]);
             into.solids.push(self.solid_count);
         }
         self.solid_count += 1;
         Ok(())
     }
+
+    fn too_far(&self, solid: &Solid, at: &Pose) -> SpecError {
+        let message = format!("an item extends to more than {} km from the origin", MAX_LENGTH_M / 1000.0);
+        match solid.file {
+            Some(file) => SpecError::about(self.source, file, message).with_help(meshes::offset(&solid.mesh, at)),
+            None => SpecError::plain(&self.source.name, message).with_help("lengths are metres"),
+        }
+    }
+}
+
+/// A shape to be placed.
+struct Solid<'a> {
+    mesh: Rc<MeshTriangles>,
+    /// Materials: that of the item, then those of the mesh's names.
+    ids: Vec<MaterialId>,
+    /// File of a mesh.
+    file: Option<&'a str>,
 }

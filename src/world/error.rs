@@ -1,4 +1,4 @@
-use zsim_base::spec::SpecError;
+use zsim_base::spec::{Source, SpecError};
 
 /// Why a world cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -9,4 +9,16 @@ pub enum WorldError {
     /// A mesh of the scene is invalid; the error points to the name in the scene.
     #[error(transparent)]
     Mesh(SpecError),
+}
+
+/// An error about a name that the scene does not define; lists the names that it defines.
+pub(super) fn unknown_name<'a>(
+    source: &Source,
+    what: &str,
+    name: &str,
+    known: impl Iterator<Item = &'a String>,
+) -> SpecError {
+    let known: Vec<&str> = known.map(String::as_str).collect();
+    SpecError::about(source, name, format!("the scene has no {what} `{name}`"))
+        .with_help(format!("it has: {}", if known.is_empty() { "none".to_owned() } else { known.join(", ") }))
 }

@@ -26,3 +26,8 @@ impl Material {
         self.transmission > 0.0
     }
 }
+
+/// A name as one word, as an OBJ file needs it: without white space, control characters and comments.
+pub(super) fn one_word(name: &str) -> String {
+    name.chars().map(|c| if c.is_whitespace() || c.is_control() || c == '#' || c == '\\' { '_' } else { c }).collect()
+}

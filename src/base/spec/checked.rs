@@ -8,6 +8,11 @@ use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 use std::borrow::Cow;
 
+/// Maximum length in a scene, and maximum coordinate of a surface or a route, m.
+///
+/// Beyond, the single precision of the ray search is too coarse.
+pub const MAX_LENGTH_M: f64 = 100_000.0;
+
 /// Defines a checked number and the array of such numbers.
 macro_rules! checked {
     ($(#[$doc:meta])* $number:ident, $array:ident, $accepts:expr, $expected:literal, $several:literal, $schema:tt) => {
@@ -119,6 +124,16 @@ checked!(
     "a finite number above 0",
     "finite numbers above 0",
     { "type": "number", "exclusiveMinimum": 0.0 }
+);
+
+checked!(
+    /// A length above zero, m, at most [`MAX_LENGTH_M`].
+    Length,
+    LengthArray,
+    |x| x > 0.0 && x <= MAX_LENGTH_M,
+    "a length of at most 100 km (100000 m) and above 0",
+    "lengths of at most 100 km (100000 m) and above 0",
+    { "type": "number", "exclusiveMinimum": 0.0, "maximum": 100_000.0 }
 );
 
 checked!(

@@ -1,6 +1,7 @@
 //! Wavefront OBJ.
 
 use super::part::Part;
+use crate::material::one_word;
 use std::fmt::Write;
 
 /// The text of the file: a group and a material name for each part, corners in order of the triangles.
@@ -19,9 +20,4 @@ pub(super) fn encode(name: &str, parts: &[Part<'_>]) -> String {
         }
     }
     text
-}
-
-/// A name without white space and control characters.
-fn one_word(name: &str) -> String {
-    name.chars().map(|c| if c.is_whitespace() || c.is_control() || c == '#' || c == '\\' { '_' } else { c }).collect()
 }

@@ -1,6 +1,11 @@
 //! Errors of meshes.
 
-/// Maximum file size, bytes: twice the maximum number of triangles of a scene as binary STL.
+use super::builder::MAX_VERTICES;
+use super::polygon::FaceFault;
+use crate::triangle::MAX_TRIANGLES;
+
+/// Maximum size of a mesh's file, and of the buffers of a glTF file together, bytes: twice the maximum number of triangles of
+/// a scene as binary STL.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 
 /// Why a mesh cannot be used. The name of the file precedes the message.
@@ -10,16 +15,26 @@ pub(crate) enum MeshError {
     Io(#[from] std::io::Error),
     #[error("has {0} bytes; a mesh has at most {MAX_BYTES}")]
     TooLarge(u64),
+    #[error("has more than {MAX_TRIANGLES} triangles")]
+    TooManyTriangles,
+    #[error("has more than {MAX_VERTICES} vertices")]
+    TooManyVertices,
+    #[error("has more than {} materials", u16::MAX)]
+    TooManyMaterials,
     #[error("ends in neither .obj, .stl, .ply, .gltf nor .glb")]
     UnknownFormat,
     #[error(
         "is a COLLADA file, which is not supported: convert it to glTF with Blender (import the .dae, export as .glb) or with `assimp export model.dae model.glb`"
     )]
     Collada,
+    #[error("is UTF-16 text: save it as UTF-8, for example with `iconv -f UTF-16 -t UTF-8`")]
+    Utf16,
     #[error("is not a valid {format} mesh: {problem}")]
     Malformed { format: &'static str, problem: String },
     #[error("declares {declared}, but contains {found}")]
     CountMismatch { declared: String, found: String },
+    #[error("face {face} {fault}")]
+    Face { face: usize, fault: FaceFault },
     #[error("face {face} names the vertex {index}; there are {vertices}")]
     NoSuchVertex { face: usize, index: i64, vertices: usize },
     #[error("has no triangles")]

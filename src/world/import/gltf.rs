@@ -1,21 +1,22 @@
 //! glTF 2.0 (`.gltf` with buffers, or `.glb`): the triangles of the scene with the transforms of the nodes.
 
 mod accessor;
+mod buffers;
 mod document;
 mod error;
 
-use super::error::{MAX_BYTES, MeshError};
-use super::polygon::triangulate;
-use crate::triangle::{MAX_TRIANGLES, Triangle};
-use accessor::{Data, base64};
-use document::{Buffer, Document, Primitive};
+use super::builder::{Faces, MAX_VERTICES, MeshBuilder, corners};
+use super::error::MeshError;
+use super::text::without_mark;
+use accessor::Data;
+use document::{Document, Primitive};
 use error::malformed;
-use std::path::{Component, Path};
+use std::path::Path;
 use zsim_base::geometry::Vector;
 
 type Transform = nalgebra::Matrix4<f64>;
 
-/// Maximum nesting depth, and maximum number of node visits: several nodes may refer to the same child.
+/// Maximum nesting depth, and maximum number of visits of nodes and primitives: several nodes may refer to the same child.
 const MAX_DEPTH: usize = 64;
 const MAX_VISITS: usize = 1_000_000;
 
@@ -25,23 +26,24 @@ const TRIANGLE_STRIP: u32 = 5;
 const TRIANGLE_FAN: u32 = 6;
 
 /// The triangles of a glTF file; `folder` contains the buffers.
-pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Vec<Triangle>, MeshError> {
+pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Faces, MeshError> {
     let (json, blob) = split(bytes)?;
     let document = Document::parse(json).map_err(malformed)?;
-    let buffers = document.buffers.iter().map(|buffer| load(buffer, blob, folder)).collect::<Result<Vec<_>, _>>()?;
-    let scene = document.scenes.get(document.scene).ok_or_else(|| malformed("it has no scene"))?;
+    let buffers = buffers::load(&document.buffers.0, blob, folder)?;
+    let scene = document.scenes.0.get(document.scene).ok_or_else(|| malformed("it has no scene"))?;
     let roots = scene.nodes.clone();
-    let mut traversal = NodeTraversal { data: &Data { document, buffers }, triangles: Vec::new(), visits: 0 };
+    let data = &Data { document, buffers };
+    let mut traversal = NodeTraversal { data, mesh: MeshBuilder::default(), vertices: 0, visits: 0 };
     for root in roots {
         traversal.visit(root, &Transform::identity(), 0)?;
     }
-    Ok(traversal.triangles)
+    Ok(traversal.mesh.finish())
 }
 
 /// The JSON and the binary chunk of a `.glb`; a `.gltf` is JSON only.
 fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((bytes, None));
+        return Ok((without_mark(bytes), None));
     }
     let word = |at: usize| {
         let word = bytes.get(at..at.checked_add(4)?)?;
@@ -64,59 +66,26 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshError> {
     Ok((json, blob))
 }
 
-/// The bytes of a buffer: the binary chunk, a base64 URI, or a file in the mesh's folder or a subfolder.
-fn load(buffer: &Buffer, blob: Option<&[u8]>, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
-    let data = match &buffer.uri {
-        None => blob.ok_or_else(|| malformed("its binary chunk is missing"))?.to_vec(),
-        Some(uri) => match uri.strip_prefix("data:") {
-            Some(data) => {
-                let text = data.split_once(";base64,").map(|(_, text)| text);
-                text.and_then(base64).ok_or_else(|| malformed("a buffer's data URI is not base64"))?
-            }
-            None => read_buffer_file(uri, folder)?,
-        },
-    };
-    if data.len() < buffer.byte_length {
-        let declared = format!("{} bytes in a buffer", buffer.byte_length);
-        return Err(MeshError::CountMismatch { declared, found: format!("{} bytes", data.len()) });
-    }
-    Ok(data)
-}
-
-fn read_buffer_file(uri: &str, folder: Option<&Path>) -> Result<Vec<u8>, MeshError> {
-    let relative = uri.replace("%20", " ");
-    let relative = Path::new(&relative);
-    let stays = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    let Some(folder) = folder.filter(|_| stays) else {
-        return Err(malformed(format!("the buffer `{uri}` is not a file in the mesh's folder")));
-    };
-    let path = folder.join(relative);
-    let named = |error: std::io::Error| malformed(format!("the buffer `{}` cannot be read: {error}", path.display()));
-    let meta = std::fs::metadata(&path).map_err(named)?;
-    if meta.len() > MAX_BYTES {
-        return Err(MeshError::TooLarge(meta.len()));
-    }
-    std::fs::read(&path).map_err(named)
-}
-
 struct NodeTraversal<'a> {
-    data: &'a Data,
-    triangles: Vec<Triangle>,
+    data: &'a Data<'a>,
+    mesh: MeshBuilder,
+    /// Number of vertices of the primitives so far; a primitive counts as often as nodes repeat it.
+    vertices: usize,
     visits: usize,
 }
 
 impl NodeTraversal<'_> {
     fn visit(&mut self, index: usize, parent: &Transform, depth: usize) -> Result<(), MeshError> {
-        self.visits += 1;
-        if depth > MAX_DEPTH || self.visits > MAX_VISITS {
+        self.count_visit()?;
+        if depth > MAX_DEPTH {
             return Err(malformed(format!("its nodes nest deeper than {MAX_DEPTH}, or form a cycle")));
         }
         let document = &self.data.document;
-        let node = document.nodes.get(index);
+        let node = document.nodes.0.get(index);
         let node = node.ok_or_else(|| malformed(format!("it refers to node {index}, which does not exist")))?;
         let transform = parent * node.transform();
         if let Some(mesh) = node.mesh {
-            let known = document.meshes.get(mesh);
+            let known = document.meshes.0.get(mesh);
             let known = known.ok_or_else(|| malformed(format!("it refers to mesh {mesh}, which does not exist")))?;
             for primitive in &known.primitives {
                 self.add(primitive, &transform)?;
@@ -128,27 +97,70 @@ impl NodeTraversal<'_> {
         Ok(())
     }
 
-    /// Adds a primitive; points and lines have no surface.
-    fn add(&mut self, primitive: &Primitive, transform: &Transform) -> Result<(), MeshError> {
-        if primitive.mode < TRIANGLES {
-            return Ok(());
+    fn count_visit(&mut self) -> Result<(), MeshError> {
+        self.visits += 1;
+        match self.visits > MAX_VISITS {
+            true => {
+                Err(malformed(format!("its nodes repeat each other more than {MAX_VISITS} times, or form a cycle")))
+            }
+            false => Ok(()),
         }
-        let positions =
-            primitive.attributes.get("POSITION").ok_or_else(|| malformed("a primitive has no positions"))?;
-        let place = |point: Vector| transform.transform_point(&point.into()).coords;
-        let vertices: Vec<Vector> = self.data.positions(*positions)?.into_iter().map(place).collect();
-        let indices = match primitive.indices {
-            Some(index) => self.data.indices(index)?,
-            None => (0..vertices.len() as i64).collect(),
-        };
-        self.triangles.extend(match primitive.mode {
-            TRIANGLES => triangulate(&vertices, indices.chunks_exact(3).map(<[i64]>::to_vec))?,
-            TRIANGLE_STRIP => triangulate(&vertices, indices.windows(3).map(<[i64]>::to_vec))?,
-            TRIANGLE_FAN => triangulate(&vertices, std::iter::once(indices))?,
+    }
+
+    /// Adds a primitive; points and lines have no surface. Counts are checked before anything is built.
+    fn add(&mut self, primitive: &Primitive, transform: &Transform) -> Result<(), MeshError> {
+        self.count_visit()?;
+        match primitive.mode {
+            TRIANGLES | TRIANGLE_STRIP | TRIANGLE_FAN => {}
+            mode if mode < TRIANGLES => return Ok(()),
             mode => return Err(malformed(format!("a primitive has the unknown mode {mode}"))),
-        });
-        if self.triangles.len() > MAX_TRIANGLES {
-            return Err(malformed("its nodes repeat meshes to more triangles than a scene can have"));
+        }
+        let data = self.data;
+        let positions = primitive.attributes.position.ok_or_else(|| malformed("a primitive has no positions"))?;
+        let positions = data.positions(positions)?;
+        self.vertices += positions.len();
+        if self.vertices > MAX_VERTICES {
+            return Err(MeshError::TooManyVertices);
+        }
+        let name = primitive.material.and_then(|index| data.document.materials.0.get(index)?.name.as_deref());
+        self.mesh.set_material(name)?;
+        match primitive.indices {
+            Some(index) => {
+                let indices = data.indices(index)?;
+                self.add_triangles(primitive.mode, positions, indices, transform)
+            }
+            None => {
+                let indices = 0..positions.len() as u32;
+                self.add_triangles(primitive.mode, positions, indices.map(i64::from), transform)
+            }
+        }
+    }
+
+    fn add_triangles(
+        &mut self,
+        mode: u32,
+        positions: impl Iterator<Item = Vector>,
+        mut indices: impl ExactSizeIterator<Item = i64>,
+        transform: &Transform,
+    ) -> Result<(), MeshError> {
+        let count = if mode == TRIANGLES { indices.len() / 3 } else { indices.len().saturating_sub(2) };
+        self.mesh.reserve(count)?;
+        let vertices: Vec<Vector> = positions.map(|point| transform.transform_point(&point.into()).coords).collect();
+        let mut next = || indices.next().unwrap_or(-1);
+        let mut triangle = [0; 3];
+        for k in 0..count {
+            triangle = match mode {
+                TRIANGLES => [next(), next(), next()],
+                _ if k == 0 => [next(), next(), next()],
+                TRIANGLE_STRIP => [triangle[1], triangle[2], next()],
+                _ => [triangle[0], triangle[2], next()],
+            };
+            let [a, b, c] = triangle;
+            // Strips are joined by triangles that repeat a vertex.
+            if mode == TRIANGLES || (a != b && b != c && a != c) {
+                let corners = corners(&vertices, &triangle, self.mesh.next_face())?;
+                self.mesh.triangle([corners[0], corners[1], corners[2]])?;
+            }
         }
         Ok(())
     }

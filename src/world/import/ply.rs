@@ -1,114 +1,99 @@
 //! PLY, ASCII and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices` or `vertex_index`).
 
+use super::builder::{Faces, MAX_VERTICES, MeshBuilder, corners};
 use super::error::MeshError;
-use super::polygon::triangulate;
-use crate::triangle::Triangle;
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
-use std::io::BufRead;
 use zsim_base::geometry::Vector;
+use zsim_base::ply::{Element, Failure, PlyReader, Row};
 
-/// The triangles of a PLY file; polygons are split into fans.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, MeshError> {
-    let mut reader = Reader::new(bytes);
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(malformed)?;
-    let (mut vertices, mut faces) = (None, None);
-    for element in header.elements.values() {
-        check_count(element, bytes.len())?;
+/// The triangles of a PLY file.
+pub(super) fn parse(bytes: &[u8]) -> Result<Faces, MeshError> {
+    let mut file = PlyReader::new(bytes).map_err(|(line, problem)| at_line(line, &problem))?;
+    let (mut vertices, mut mesh) = (None, MeshBuilder::default());
+    let mut has_faces = false;
+    for element in file.header().elements.clone() {
+        check_count(&element, bytes.len())?;
         match element.name.as_str() {
-            "vertex" => vertices = Some(read::<Vertex, _>(&mut reader, element, &header)?),
-            "face" => faces = Some(read::<Face, _>(&mut reader, element, &header)?),
-            _ => drop(read::<Skipped, _>(&mut reader, element, &header)?),
+            "vertex" => vertices = Some(read_vertices(&mut file, &element)?),
+            "face" => {
+                let vertices = vertices.as_ref().ok_or_else(|| malformed("its faces are before its vertices"))?;
+                read_faces(&mut file, &element, vertices, &mut mesh)?;
+                has_faces = true;
+            }
+            _ => read_each(&mut file, &element, |_| Ok(()))?,
         }
     }
-    let missing = |name: &str| MeshError::Malformed { format: "PLY", problem: format!("it has no element `{name}`") };
-    let vertices: Vec<Vector> = vertices.ok_or_else(|| missing("vertex"))?.into_iter().map(|vertex| vertex.0).collect();
-    triangulate(&vertices, faces.ok_or_else(|| missing("face"))?.into_iter().map(|face| face.0))
+    match (vertices, has_faces) {
+        (None, _) => Err(malformed("it has no element `vertex`")),
+        (_, false) => Err(malformed("it has no element `face`: it is a point cloud, not a mesh")),
+        (Some(_), true) => Ok(mesh.finish()),
+    }
 }
 
-/// An element has at least one byte, so a larger count is wrong, and parsing it would take long.
-fn check_count(element: &ElementDef, bytes: usize) -> Result<(), MeshError> {
-    if element.count <= bytes && !element.properties.is_empty() {
+fn read_vertices(file: &mut PlyReader<&[u8]>, element: &Element) -> Result<Vec<Vector>, MeshError> {
+    let axis = |name| element.property(&[name]).ok_or_else(|| malformed("its vertices have no properties x, y and z"));
+    let axes = [axis("x")?, axis("y")?, axis("z")?];
+    if element.count > MAX_VERTICES as u64 {
+        return Err(MeshError::TooManyVertices);
+    }
+    let mut vertices = Vec::new();
+    read_each(file, element, |row| {
+        vertices.push(Vector::from(axes.map(|axis| row.number(axis))));
+        Ok(())
+    })?;
+    Ok(vertices)
+}
+
+fn read_faces(
+    file: &mut PlyReader<&[u8]>,
+    element: &Element,
+    vertices: &[Vector],
+    mesh: &mut MeshBuilder,
+) -> Result<(), MeshError> {
+    let list = element.property(&["vertex_indices", "vertex_index"]);
+    let list = list.ok_or_else(|| malformed("its faces have no property `vertex_indices`"))?;
+    let mut indices: Vec<i64> = Vec::new();
+    read_each(file, element, |row| {
+        indices.clear();
+        // A number with a fraction is no index, just as a negative one.
+        indices.extend(row.property(list).iter().map(|index| if index.fract() == 0.0 { *index as i64 } else { -1 }));
+        let corners = corners(vertices, &indices, mesh.next_face())?;
+        mesh.polygon(&corners)
+    })
+}
+
+/// Reads all elements of a kind.
+fn read_each(
+    file: &mut PlyReader<&[u8]>,
+    element: &Element,
+    mut each: impl FnMut(&Row) -> Result<(), MeshError>,
+) -> Result<(), MeshError> {
+    let mut row = Row::default();
+    for index in 0..element.count {
+        file.read(element, &mut row).map_err(|failure| match failure {
+            Failure::Problem(problem) => at_line(file.line(), &problem),
+            Failure::End => {
+                let declared = format!("{} of `{}`", element.count, element.name);
+                MeshError::CountMismatch { declared, found: index.to_string() }
+            }
+        })?;
+        each(&row)?;
+    }
+    Ok(())
+}
+
+/// An element has at least one byte, so a larger count is wrong, and reading elements without properties would take long.
+fn check_count(element: &Element, bytes: usize) -> Result<(), MeshError> {
+    if element.count <= bytes as u64 && !element.properties.is_empty() {
         return Ok(());
     }
     let declared = format!("{} of `{}` with {} properties", element.count, element.name, element.properties.len());
     Err(MeshError::CountMismatch { declared, found: format!("{bytes} bytes") })
 }
 
-fn read<E: PropertyAccess, B: BufRead>(
-    reader: &mut Reader<B>,
-    element: &ElementDef,
-    header: &Header,
-) -> Result<Vec<E>, MeshError> {
-    Parser::<E>::new().read_payload_for_element(reader, element, header).map_err(malformed)
+fn at_line(line: usize, problem: &str) -> MeshError {
+    malformed(&format!("line {line}: {problem}"))
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "it is handed to map_err")]
-fn malformed(error: ParseError) -> MeshError {
-    // The message of the parser quotes the failing line, which may be an entire binary file.
-    let first = error.to_string().lines().next().unwrap_or_default().chars().take(200).collect();
-    MeshError::Malformed { format: "PLY", problem: first }
-}
-
-struct Vertex(Vector);
-struct Face(Vec<i64>);
-struct Skipped;
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        // A missing coordinate stays NaN, which the check of the corners detects.
-        Self(Vector::repeat(f64::NAN))
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return PropertyAccessResult::Ignored,
-        };
-        self.0[axis] = match property {
-            Property::Char(x) => x.into(),
-            Property::UChar(x) => x.into(),
-            Property::Short(x) => x.into(),
-            Property::UShort(x) => x.into(),
-            Property::Int(x) => x.into(),
-            Property::UInt(x) => x.into(),
-            Property::Float(x) => x.into(),
-            Property::Double(x) => x,
-            _ => return PropertyAccessResult::UnsupportedType,
-        };
-        PropertyAccessResult::Set
-    }
-}
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Self(Vec::new())
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        fn widened<T: Into<i64>>(list: Vec<T>) -> Vec<i64> {
-            list.into_iter().map(Into::into).collect()
-        }
-        if !["vertex_indices", "vertex_index"].contains(&name) {
-            return PropertyAccessResult::Ignored;
-        }
-        self.0 = match property {
-            Property::ListChar(list) => widened(list),
-            Property::ListUChar(list) => widened(list),
-            Property::ListShort(list) => widened(list),
-            Property::ListUShort(list) => widened(list),
-            Property::ListInt(list) => widened(list),
-            Property::ListUInt(list) => widened(list),
-            _ => return PropertyAccessResult::UnsupportedType,
-        };
-        PropertyAccessResult::Set
-    }
-}
-
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
-    }
+fn malformed(problem: &str) -> MeshError {
+    MeshError::Malformed { format: "PLY", problem: problem.to_owned() }
 }

@@ -3,6 +3,7 @@
 use super::document::{Accessor, Document};
 use super::error::malformed;
 use crate::import::error::MeshError;
+use std::borrow::Cow;
 use zsim_base::geometry::Vector;
 
 /// Values of `componentType` in the specification.
@@ -12,14 +13,14 @@ const U32: u32 = 5125;
 const F32: u32 = 5126;
 
 /// A document with the bytes of the buffers.
-pub(super) struct Data {
+pub(super) struct Data<'a> {
     pub document: Document,
-    pub buffers: Vec<Vec<u8>>,
+    pub buffers: Vec<Cow<'a, [u8]>>,
 }
 
-impl Data {
+impl Data<'_> {
     /// The points of an accessor: three single-precision numbers each.
-    pub fn positions(&self, index: usize) -> Result<Vec<Vector>, MeshError> {
+    pub fn positions(&self, index: usize) -> Result<impl ExactSizeIterator<Item = Vector>, MeshError> {
         let accessor = self.accessor(index)?;
         if accessor.component_type != F32 || accessor.shape != "VEC3" {
             return Err(malformed("positions are not three floats"));
@@ -30,11 +31,11 @@ impl Data {
             let mut next = || words.next().map_or(f64::NAN, f64::from);
             Vector::new(next(), next(), next())
         };
-        Ok(self.elements(index, accessor, 12)?.map(point).collect())
+        Ok(self.elements(index, accessor, 12)?.map(point))
     }
 
     /// The indices of an accessor: one, two or four bytes each.
-    pub fn indices(&self, index: usize) -> Result<Vec<i64>, MeshError> {
+    pub fn indices(&self, index: usize) -> Result<impl ExactSizeIterator<Item = i64>, MeshError> {
         let accessor = self.accessor(index)?;
         let size = match (accessor.component_type, accessor.shape.as_str()) {
             (U8, "SCALAR") => 1,
@@ -43,11 +44,11 @@ impl Data {
             _ => return Err(malformed("indices are not unsigned integers")),
         };
         let value = |element: &[u8]| element.iter().rev().fold(0, |value, byte| value << 8 | i64::from(*byte));
-        Ok(self.elements(index, accessor, size)?.map(value).collect())
+        Ok(self.elements(index, accessor, size)?.map(value))
     }
 
     fn accessor(&self, index: usize) -> Result<&Accessor, MeshError> {
-        let accessor = self.document.accessors.get(index);
+        let accessor = self.document.accessors.0.get(index);
         let accessor =
             accessor.ok_or_else(|| malformed(format!("it refers to accessor {index}, which does not exist")))?;
         if accessor.sparse.is_some() {
@@ -62,9 +63,9 @@ impl Data {
         index: usize,
         accessor: &Accessor,
         size: usize,
-    ) -> Result<impl Iterator<Item = &[u8]>, MeshError> {
+    ) -> Result<impl ExactSizeIterator<Item = &[u8]>, MeshError> {
         let span = || {
-            let view = self.document.buffer_views.get(accessor.buffer_view?)?;
+            let view = self.document.buffer_views.0.get(accessor.buffer_view?)?;
             let stride = view.byte_stride.unwrap_or(size);
             let bytes = self.buffers.get(view.buffer)?;
             let bytes = bytes.get(view.byte_offset..view.byte_offset.checked_add(view.byte_length)?)?;
@@ -77,39 +78,5 @@ impl Data {
         };
         let (stride, bytes) = span().ok_or_else(|| malformed(format!("accessor {index} extends beyond its buffer")))?;
         Ok((0..accessor.count).map(move |k| &bytes[k * stride..k * stride + size]))
-    }
-}
-
-/// Decodes base64 (RFC 4648), with or without padding.
-pub(super) fn base64(text: &str) -> Option<Vec<u8>> {
-    let digits = text.trim_end_matches('=').bytes().map(|byte| match byte {
-        b'A'..=b'Z' => Some(byte - b'A'),
-        b'a'..=b'z' => Some(byte - b'a' + 26),
-        b'0'..=b'9' => Some(byte - b'0' + 52),
-        b'+' => Some(62),
-        b'/' => Some(63),
-        _ => None,
-    });
-    let digits = digits.collect::<Option<Vec<u8>>>()?;
-    let bytes = |group: &[u8]| {
-        let bits = group.iter().fold(0_u32, |bits, digit| bits << 6 | u32::from(*digit)) << (6 * (4 - group.len()));
-        bits.to_be_bytes()[1..group.len()].to_vec()
-    };
-    Some(digits.chunks(4).flat_map(bytes).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn base64_agrees_with_the_vectors_of_its_standard() {
-        // RFC 4648, section 10.
-        let vectors =
-            [("", ""), ("Zg==", "f"), ("Zm8=", "fo"), ("Zm9v", "foo"), ("Zm9vYg==", "foob"), ("Zm9vYmE", "fooba")];
-        for (text, bytes) in vectors {
-            assert_eq!(base64(text).unwrap(), bytes.as_bytes());
-        }
-        assert!(base64("Zm9*").is_none());
     }
 }
