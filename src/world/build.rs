@@ -10,6 +10,7 @@ use super::meshes::{self, MeshFile, Meshes};
 use super::mover::{Mover, Path};
 use super::routes::routes;
 use super::scatter;
+use super::sway::check_sway;
 use super::triangle::{MAX_TRIANGLES, Surfaces};
 use super::{
     CanopySpec, ItemSpec, Material, MaterialId, MaterialKind, MoverSpec, Placement, ScatterSpec, SceneSpec, ShapeSpec,
@@ -22,6 +23,8 @@ use zsim_base::geometry::{Pose, Route};
 use zsim_base::spec::checked::MAX_LENGTH_M;
 use zsim_base::spec::{Source, SpecError};
 
+/// Maximum time of a waypoint, s: differences of times stay exact to below a microsecond.
+const MAX_TIME_S: f64 = 1e9;
 /// Maximum nesting depth of templates: a guard against a template that contains itself.
 const MAX_DEPTH: usize = 8;
 
@@ -47,6 +50,7 @@ pub(super) fn build(spec: &SceneSpec, source: &Source) -> Result<WorldParts, Wor
         material_ids,
         routes: routes(spec, source)?,
         meshes: Meshes::default(),
+        scatter_budget: scatter::Budget::default(),
         triangle_count: 0,
         solid_count: 0,
     };
@@ -103,6 +107,7 @@ struct Builder<'a> {
     materials_by_word: BTreeMap<String, MaterialId>,
     routes: BTreeMap<String, Route>,
     meshes: Meshes,
+    scatter_budget: scatter::Budget,
     triangle_count: usize,
     solid_count: u32,
 }
@@ -156,12 +161,14 @@ impl Builder<'_> {
     }
 
     /// Poses of scattered copies in the frame of the scatter, whose pose is `at`.
-    fn scattered(&self, scatter: &ScatterSpec, at: &Pose) -> Result<Vec<Pose>, SpecError> {
+    fn scattered(&mut self, scatter: &ScatterSpec, at: &Pose) -> Result<Vec<Pose>, SpecError> {
         let routes: Vec<&Route> = self.routes.values().collect();
-        scatter::poses(scatter, at, &routes).map_err(|(key, sentence)| SpecError::about(self.source, key, sentence))
+        let poses = scatter::poses(scatter, at, &routes, &mut self.scatter_budget);
+        poses.map_err(|(key, sentence)| SpecError::about(self.source, key, sentence))
     }
 
     fn meadow(&mut self, spec: &SwaySpec) -> Result<Meadow, WorldError> {
+        check_sway(spec).map_err(|(key, message)| SpecError::about(self.source, key, message))?;
         let poses = self.scattered(&spec.scatter, &Pose::identity())?;
         Ok(Meadow::new(spec, self.template_surfaces(&spec.scatter.template)?, poses))
     }
@@ -169,6 +176,11 @@ impl Builder<'_> {
     fn canopies(&self, spec: &CanopySpec) -> Result<Vec<Canopy>, SpecError> {
         let id = self.material_id(&spec.material)?;
         let poses = self.poses(&spec.at_m_deg, &spec.material)?;
+        if !poses.iter().all(is_within) {
+            let message =
+                format!("a canopy of `{}` is not within {} km of the origin", spec.material, MAX_LENGTH_M / 1000.0);
+            return Err(SpecError::about(self.source, "canopies", message));
+        }
         Ok(poses.iter().map(|pose| Canopy::new(pose, spec.size_m, spec.extinction_per_m, id)).collect())
     }
 
@@ -187,11 +199,17 @@ impl Builder<'_> {
         if mover.waypoints.is_empty() {
             return Err(wrong("has no waypoints; it needs at least one"));
         }
+        if mover.waypoints.iter().any(|at| at.time_s.abs() > MAX_TIME_S) {
+            return Err(wrong("has a waypoint at more than 1e9 s"));
+        }
         if mover.waypoints.windows(2).any(|pair| pair[0].time_s >= pair[1].time_s) {
             return Err(wrong("has waypoints whose times do not increase"));
         }
         let waypoints: Vec<(f64, Pose)> =
             mover.waypoints.iter().map(|at| (at.time_s, at.at_m_deg.world_from_body())).collect();
+        if !waypoints.iter().all(|(_, pose)| is_within(pose)) {
+            return Err(wrong("has a waypoint that is not within 100 km of the origin"));
+        }
         let turns_half = |pair: &[(f64, Pose)]| pair[0].1.rotation.angle_to(&pair[1].1.rotation) > 3.1;
         if waypoints.windows(2).any(turns_half) {
             return Err(wrong("turns by 180 degrees between two waypoints: add a waypoint to fix the direction"));
@@ -258,6 +276,10 @@ impl Builder<'_> {
             None => SpecError::plain(&self.source.name, message).with_help("lengths are metres"),
         }
     }
+}
+
+fn is_within(pose: &Pose) -> bool {
+    pose.translation.vector.iter().all(|x| x.abs() <= MAX_LENGTH_M)
 }
 
 /// A shape to be placed.

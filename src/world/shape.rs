@@ -21,25 +21,25 @@ pub enum ShapeSpec {
     /// A box, centred on the origin in x and y.
     Box {
         /// Extents along x, y, z, m.
-        #[serde(with = "checked::PositiveArray::<3>")]
+        #[serde(with = "checked::LengthArray::<3>")]
         size_m: [f64; 3],
     },
     /// A rectangle in the plane z = 0, centred on the origin, visible from both sides.
     Rectangle {
         /// Extents along x and y, m.
-        #[serde(with = "checked::PositiveArray::<2>")]
+        #[serde(with = "checked::LengthArray::<2>")]
         size_m: [f64; 2],
     },
     /// A wall from the origin along x, centred on y = 0.
     Wall {
         /// Extent along x, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         length_m: f64,
         /// Extent along z, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         height_m: f64,
         /// Extent along y, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         thickness_m: f64,
         /// Doorways and windows in order along x. Default: none.
         #[serde(default)]
@@ -48,10 +48,10 @@ pub enum ShapeSpec {
     /// An upright cylinder about z: a prism whose corners lie on the circle.
     Cylinder {
         /// Radius, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         radius_m: f64,
         /// Extent along z, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         height_m: f64,
         /// Number of sides. Default: 24.
         #[serde(default = "default_sides")]
@@ -62,13 +62,13 @@ pub enum ShapeSpec {
         /// Number of steps.
         steps: usize,
         /// Extent along y, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         width_m: f64,
         /// Height of a step, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         rise_m: f64,
         /// Depth of a step, m.
-        #[serde(with = "checked::Positive")]
+        #[serde(with = "checked::Length")]
         tread_m: f64,
         /// Thickness below the inner edges of the steps, m, with a sloped soffit. Default: solid down to z = 0.
         #[serde(default, with = "checked::NonNegative")]
@@ -77,7 +77,7 @@ pub enum ShapeSpec {
     /// Terrain with a height at each node of a grid, centred on the origin in x and y.
     HeightField {
         /// Extents along x and y, m.
-        #[serde(with = "checked::PositiveArray::<2>")]
+        #[serde(with = "checked::LengthArray::<2>")]
         size_m: [f64; 2],
         /// The heights.
         heights: HeightsSpec,

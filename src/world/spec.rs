@@ -183,7 +183,7 @@ pub struct SwaySpec {
 #[serde(deny_unknown_fields)]
 pub struct CanopySpec {
     /// Extents along x, y, z, m; the box is centred on the origin in x and y, from z = 0 upward.
-    #[serde(with = "checked::PositiveArray::<3>")]
+    #[serde(with = "checked::LengthArray::<3>")]
     pub size_m: [f64; 3],
     /// Extinction coefficient k, 1/m: half the leaf area per volume, for leaves without preferred direction.
     #[serde(with = "checked::Positive")]

@@ -5,6 +5,26 @@ use nalgebra::Unit;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use zsim_base::geometry::{Pose, Rotation, Vector};
 
+/// Maximum frequency, Hz, and minimum speed of gusts, m/s: beyond, phases are no longer exact.
+const MAX_FREQUENCY_HZ: f64 = 1000.0;
+const MIN_GUST_SPEED_M_PER_S: f64 = 1e-3;
+
+/// Checks the numbers of swaying plants; an error is a key and a message.
+pub(super) fn check_sway(spec: &SwaySpec) -> Result<(), (&'static str, String)> {
+    let SwaySpec { lean_deg, amplitude_deg, frequency_hz, gust_speed_m_per_s, .. } = spec;
+    if lean_deg + amplitude_deg > 90.0 {
+        return Err(("lean_deg", format!("plants lean by {lean_deg} + {amplitude_deg} degrees; the maximum is 90")));
+    }
+    if *frequency_hz > MAX_FREQUENCY_HZ {
+        return Err(("frequency_hz", format!("`frequency_hz` is {frequency_hz}; the maximum is {MAX_FREQUENCY_HZ}")));
+    }
+    if *gust_speed_m_per_s < MIN_GUST_SPEED_M_PER_S {
+        let message = format!("`gust_speed_m_per_s` is {gust_speed_m_per_s}; the minimum is {MIN_GUST_SPEED_M_PER_S}");
+        return Err(("gust_speed_m_per_s", message));
+    }
+    Ok(())
+}
+
 /// The motion of one plant.
 pub(super) struct Sway {
     world_from_body: Pose,

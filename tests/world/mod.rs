@@ -3,6 +3,7 @@
 mod casts;
 mod exports;
 mod includes;
+mod limits;
 mod mesh_files;
 mod meshes;
 mod planes;
