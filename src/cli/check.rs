@@ -51,9 +51,17 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut figures = Vec::new();
     for (file, result) in &checked {
         match result {
-            Ok(kind) => {
-                words += &format!("{file}: {}, OK\n", kind.noun());
-                figures.push(json!({ "file": file, "kind": kind.noun(), "error": null }));
+            Ok((kind, warnings)) => {
+                let count = match warnings.len() {
+                    0 => String::new(),
+                    1 => ", 1 warning".to_owned(),
+                    count => format!(", {count} warnings"),
+                };
+                words += &format!("{file}: {}, OK{count}\n", kind.noun());
+                figures.push(json!({ "file": file, "kind": kind.noun(), "error": null, "warnings": warnings }));
+                warnings
+                    .iter()
+                    .for_each(|warning| eprintln!("warning: {}", output::printable(&format!("{file}: {warning}"))));
             }
             Err(error) => {
                 let at = error.line_and_column();
@@ -71,12 +79,15 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     Ok(Completion::Done)
 }
 
-/// Checks a file, or a scene or spec of the library by name; returns its kind.
+/// Kind of a valid file, and warnings.
+type Checked = (Kind, Vec<String>);
+
+/// Checks a file, or a scene or spec of the library by name.
 ///
 /// The folder of a file tells its kind, if it has the name of one; otherwise each kind is tried.
-fn check(file: &str) -> Result<Kind, SpecError> {
+fn check(file: &str) -> Result<Checked, SpecError> {
     if let Some(kind) = kind_by_folder(file) {
-        return build(kind, &find(kind, file)?).map(|()| kind);
+        return build(kind, &find(kind, file)?).map(|warnings| (kind, warnings));
     }
     let path = Path::new(file);
     let source = match path.is_file() {
@@ -86,18 +97,18 @@ fn check(file: &str) -> Result<Kind, SpecError> {
             let Some((kind, source)) = found else {
                 return Err(SpecError::plain(file, "no such file, and no scene or spec of this name"));
             };
-            return build(kind, &source).map(|()| kind);
+            return build(kind, &source).map(|warnings| (kind, warnings));
         }
     };
     kind_by_trying(&source)
 }
 
 /// The kind whose parser accepts the text, checked; if none does, the error with the largest line number.
-fn kind_by_trying(source: &Source) -> Result<Kind, SpecError> {
+fn kind_by_trying(source: &Source) -> Result<Checked, SpecError> {
     let mut farthest: Option<SpecError> = None;
     for kind in KINDS {
         match parse_as(kind, source) {
-            Ok(()) => return build(kind, source).map(|()| kind),
+            Ok(()) => return build(kind, source).map(|warnings| (kind, warnings)),
             Err(error) => {
                 let is_farther = farthest.as_ref().is_none_or(|far| error.line_and_column() > far.line_and_column());
                 farthest = if is_farther { Some(error) } else { farthest };
@@ -155,13 +166,14 @@ impl Study {
     }
 }
 
-/// Builds the model that the spec describes, as a run does.
-fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
+/// Builds the model that the spec describes, as a run does; returns the warnings about a scene.
+fn build(kind: Kind, source: &Source) -> Result<Vec<String>, SpecError> {
     let spec_error = |error: &dyn std::error::Error| SpecError::plain(source.name.clone(), error.to_string());
-    match kind {
+    let mut warnings = Vec::new();
+    let built = match kind {
         Kind::Scene => match World::build(&SceneSpec::parse(source)?, source) {
             Ok(world) => {
-                world.notes().iter().for_each(|note| eprintln!("note: {note}"));
+                warnings = [world.notes(), &world.route_warnings()].concat();
                 Ok(())
             }
             Err(WorldError::Scene(error) | WorldError::Mesh(error)) => Err(error),
@@ -196,5 +208,6 @@ fn build(kind: Kind, source: &Source) -> Result<(), SpecError> {
             Err(error) => Err(spec_error(&error)),
         },
         Kind::Experiment => ExperimentSpec::parse(source)?.check(source),
-    }
+    };
+    built.map(|()| warnings)
 }

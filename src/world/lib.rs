@@ -33,6 +33,7 @@ mod mover;
 mod placement;
 mod planes;
 mod ray;
+mod route_check;
 mod routes;
 mod scatter;
 mod section;

@@ -73,6 +73,13 @@ impl World {
         self.first_hit(&timed, self.static_surfaces.cast(&ray.origin_in_world, &ray.direction_in_world, max_range_m))
     }
 
+    /// The first static surface within `max_range_m` along `ray`.
+    pub(super) fn cast_static(&self, ray: &Ray, max_range_m: f64) -> Option<Hit> {
+        let crossing = self.static_surfaces.cast(&ray.origin_in_world, &ray.direction_in_world, max_range_m)?;
+        let Crossing { distance, normal, material, face } = crossing;
+        Some(Hit { distance_m: distance, normal_in_world: normal, material, face: Some(face) })
+    }
+
     /// The first surface on each ray of a scan, as [`World::cast`] finds it, but several times faster.
     ///
     /// Each 16 rays in sequence are searched together, so neighbours in the slice should be neighbours in space. Rays
@@ -198,7 +205,8 @@ impl World {
         self.static_surfaces.len()
     }
 
-    /// Warnings about the scene, one sentence each: triangles without area that were removed from a mesh, and meshes that may be in mm.
+    /// Notes about the meshes, one sentence each: triangles without area that were removed, sizes that suggest another unit,
+    /// places far from the origin, and materials that the scene does not have.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

@@ -8,6 +8,7 @@ mod mesh_files;
 mod meshes;
 mod planes;
 mod plants;
+mod routes;
 mod scenes;
 mod specs;
 mod traffic;
