@@ -31,8 +31,8 @@ fn flatten(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError>
     let mut others: Option<SceneSpec> = None;
     for name in &spec.include {
         let wrong = |what: String| SpecError::about(source, name, format!("the included scene `{name}` {what}"));
-        let other =
-            find_from(Kind::Scene, source, name).map_err(|error| wrong(format!("is missing: {}", error.message())))?;
+        let other = find_from(Kind::Scene, source, name)
+            .map_err(|error| wrong(format!("cannot be used: {}", error.message())))?;
         if chain.iter().any(|before| before.text == other.text) {
             return Err(wrong("includes itself, directly or through another".to_owned()).into());
         }

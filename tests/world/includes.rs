@@ -72,7 +72,7 @@ fn fault(files: &[(&str, &str)], name: &str) -> String {
 #[test]
 fn invalid_includes_are_errors_with_file_and_line() {
     let missing = fault(&[("guest.ron", GUEST)], "guest.ron");
-    assert!(missing.contains("guest.ron:3:") && missing.contains("`hall` is missing: no such scene"), "{missing}");
+    assert!(missing.contains("guest.ron:3:") && missing.contains("`hall` cannot be used: no such scene"), "{missing}");
 
     let itself = fault(&[("guest.ron", &GUEST.replace("\"hall\"", "\"guest.ron\""))], "guest.ron");
     assert!(itself.contains("guest.ron:3:") && itself.contains("includes itself"), "{itself}");
@@ -94,6 +94,19 @@ fn invalid_includes_are_errors_with_file_and_line() {
         "guest.ron",
     );
     assert!(unknown.contains("hall.ron:4:") && unknown.contains("no material `cloth`"), "{unknown}");
+}
+
+#[test]
+fn an_error_of_an_included_file_does_not_show_its_content() {
+    for name in ["secret.txt", "secret", "sub/secret.conf"] {
+        let scene = GUEST.replace("\"hall\"", &format!("\"{name}\""));
+        let message = fault(&[(name, "password: swordfish\n"), ("guest.ron", &scene)], "guest.ron");
+        assert!(
+            message.contains("guest.ron:3:") && message.contains(name) && message.contains("must end in .ron"),
+            "{message}"
+        );
+        assert!(!message.contains("password") && !message.contains("swordfish"), "{message}");
+    }
 }
 
 #[test]

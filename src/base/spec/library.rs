@@ -152,10 +152,17 @@ fn found(kind: Kind, name: &str) -> Result<Option<Source>, SpecError> {
     let file = file_of(name);
     let local = Path::new(kind.folder()).join(&file);
     let candidates = [PathBuf::from(name), PathBuf::from(&file), local];
-    match candidates.iter().find(|path| path.is_file()) {
-        Some(path) => Source::read(path).map(Some),
-        None => Ok(built_in(kind, &file)),
+    let is_spec = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "ron") && path.is_file();
+    if let Some(path) = candidates.iter().find(is_spec) {
+        return Source::read(path).map(Some);
     }
+    let built_in = built_in(kind, &file);
+    if built_in.is_none() && Path::new(name).is_file() {
+        // A spec can name any file of the machine, and an error about a spec quotes a line of it.
+        let message = format!("is not a {}: the name of its file must end in .ron", kind.noun());
+        return Err(SpecError::plain(name, message));
+    }
+    Ok(built_in)
 }
 
 /// File name of the spec `name`.

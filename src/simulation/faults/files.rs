@@ -1,7 +1,7 @@
 //! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
-use zsim_base::spec::{Kind, NamedSpec, Position, Source, SpecError, parse, text_file};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse, text_file};
 
 /// Maximum number of arrival times in a file: bounds the memory.
 const MAX_ARRIVALS: usize = 1_000_000;
@@ -35,14 +35,15 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
             continue;
         }
         let wrong = |message: String| {
-            let place = Position { line: index + 1, column: 1 };
-            SpecError::at(file, place, message).with_help("one arrival time a line, s, in order; `#` before comments")
+            // Without the line itself: the spec can name any file of the machine.
+            let message = format!("line {}: {message}", index + 1);
+            SpecError::plain(&file.name, message).with_help("one arrival time a line, s, in order; `#` before comments")
         };
         let last = arrivals_s.last().copied().unwrap_or(0.0);
         match number.parse::<f64>() {
             Ok(s) if s.is_finite() && s >= 0.0 && s >= last => arrivals_s.push(s),
             Ok(s) => return Err(wrong(format!("an arrival at {s} s, after one at {last} s"))),
-            Err(_) => return Err(wrong(format!("expected a number, found \"{number}\""))),
+            Err(_) => return Err(wrong("expected a number".to_owned())),
         }
         if arrivals_s.len() > MAX_ARRIVALS {
             return Err(wrong(format!("more than {MAX_ARRIVALS} arrival times")));

@@ -77,9 +77,7 @@ impl Columns {
             None => Ok(columns),
             Some((missing, names)) => {
                 let names = names.join(", ");
-                Err(format!(
-                    "a spring catalogue needs a column for the {missing}, named {names}; its first line is \"{header}\""
-                ))
+                Err(format!("the first line of a spring catalogue needs a column for the {missing}, named {names}"))
             }
         }
     }
