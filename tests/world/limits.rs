@@ -130,6 +130,11 @@ fn cases() -> Vec<(&'static str, String, &'static str)> {
             "the maximum is 10000",
         ),
         (
+            "| squares of the numbers of corners of all faces, summed | 1e10 |",
+            mesh("m.obj", &(triangle.to_owned() + &many(101, &format!("f{}\n", many(5_000, " 1 2")))), 0),
+            "too many faces with thousands of corners",
+        ),
+        (
             "| distance of a corner from the plane of its face | 2 % of the face's size |",
             mesh("m.obj", &format!("{triangle}v 1 1 0.2\nf 1 2 4 3\n"), 0),
             "the maximum is 2 %",

@@ -9,6 +9,9 @@ use zsim_base::geometry::Vector;
 /// Maximum number of vertices of a mesh: as many as its triangles can have corners.
 pub(super) const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 
+/// Maximum sum of the squared numbers of corners of all faces: the time for those that are not convex, some 10 s.
+const MAX_EFFORT: usize = 10_000_000_000;
+
 /// The triangles of a file, in its units and axes.
 #[derive(Debug, Default)]
 pub(super) struct Faces {
@@ -26,6 +29,7 @@ pub(super) struct MeshBuilder {
     numbers_of_names: BTreeMap<String, u16>,
     material: u16,
     face_count: usize,
+    effort: usize,
 }
 
 impl MeshBuilder {
@@ -50,6 +54,10 @@ impl MeshBuilder {
     /// Adds a face with its corners in order.
     pub fn polygon(&mut self, corners: &[Vector]) -> Result<(), MeshError> {
         self.face_count += 1;
+        self.effort = self.effort.saturating_add(corners.len().saturating_mul(corners.len()));
+        if self.effort > MAX_EFFORT {
+            return Err(MeshError::TooManyCorners);
+        }
         let wrong = |fault: FaceFault| MeshError::Face { face: self.face_count, fault };
         let triangles = triangulate(corners).map_err(wrong)?;
         self.reserve(triangles.len())?;

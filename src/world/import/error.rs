@@ -19,6 +19,8 @@ pub(crate) enum MeshError {
     TooManyTriangles,
     #[error("has more than {MAX_VERTICES} vertices")]
     TooManyVertices,
+    #[error("has too many faces with thousands of corners: export it with triangles")]
+    TooManyCorners,
     #[error("has more than {} materials", u16::MAX)]
     TooManyMaterials,
     #[error("ends in neither .obj, .stl, .ply, .gltf nor .glb")]
