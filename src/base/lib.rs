@@ -1,11 +1,13 @@
 //! The ground floor of zsim: what every other room may use.
 //!
 //! Stamps ([time]), [random] streams, [geometry], [signal] analysis, [spec] files, [ply] files, [measurement]s and the
-//! persistent [surfel_map]. No simulator, no estimator, no recordings.
+//! persistent [surfel_map]; [files] of results and [printable] text. No simulator, no estimator, no recordings.
 
+pub mod files;
 pub mod geometry;
 pub mod measurement;
 pub mod ply;
+pub mod printable;
 pub mod random;
 pub mod signal;
 pub mod spec;
