@@ -1,4 +1,7 @@
 //! Quantiles of the chi-squared distribution, for confidence intervals of a variance.
+//!
+//! `statrs` 0.18 does not serve: its quantiles of 1 degree and less panic or are wrong, and those of 1e5 and more, which Allan
+//! deviations of long records need, differ by 5e-4 and more.
 
 /// The quantile of the chi-squared distribution with `degrees` degrees of freedom at `probability`.
 ///
