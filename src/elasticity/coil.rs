@@ -43,6 +43,8 @@ pub struct Coil {
 const INDEX: [f64; 2] = [4.0, 20.0];
 /// Pitch angles without load for which the force law is valid, degrees.
 const PITCH_DEG: [f64; 2] = [0.0, 15.0];
+/// Maximum number of active coils: models and drawings have a number of elements for each.
+const MAX_COILS: f64 = 1000.0;
 /// Relative tolerance at the ends of the range: 4 mm over 1 mm is in it.
 const RANGE_ROUNDING: f64 = 1e-9;
 
@@ -52,8 +54,8 @@ impl Coil {
     /// All numbers are finite and above zero.
     ///
     /// # Errors
-    /// When the spring index (coil over wire diameter) is below 2, the coils touch without load, or Poisson's ratio is
-    /// outside -1 to 0.5.
+    /// When the spring index (coil over wire diameter) is below 2, there are more than 1000 coils, the coils touch without
+    /// load, or Poisson's ratio is outside -1 to 0.5.
     pub fn new(
         coil_diameter_m: f64,
         wire_diameter_m: f64,
@@ -72,6 +74,9 @@ impl Coil {
         if index < 2.0 {
             let (wire_mm, coil_mm) = (wire_diameter_m * 1e3, coil_diameter_m * 1e3);
             return Err(ElasticityError::IndexTooSmall { wire_mm, coil_mm, index });
+        }
+        if active_coils > MAX_COILS {
+            return Err(ElasticityError::TooManyCoils { coils: active_coils, most: MAX_COILS });
         }
         if coil.solid_length_m() >= free_length_m {
             return Err(ElasticityError::CoilsTouch {

@@ -46,6 +46,14 @@ pub enum ElasticityError {
         /// Free length, mm.
         free_mm: f64,
     },
+    /// More coils than a model or a drawing of the spring can have.
+    #[error("{coils:e} active coils; expected at most {most}")]
+    TooManyCoils {
+        /// Active coils.
+        coils: f64,
+        /// Maximum number.
+        most: f64,
+    },
     /// The load compresses the spring to the solid length.
     #[error(
         "a load of {load_n:.2} N compresses the spring to {loaded_mm:.2} mm, but the coils touch at {solid_mm:.2} mm"

@@ -152,6 +152,67 @@ fn out_of_range_numbers_are_refused_with_their_limit() {
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 3, "no file remains");
 }
 
+#[test]
+fn counts_of_studies_and_springs_are_refused_with_their_limit() {
+    let here = tempfile::tempdir().unwrap();
+    let spring = |axes: &str, sampling: &str| {
+        format!(
+            r#"(base: spring(head: "handheld", shake: (pitch_deg: 2.0)), axes: [{axes}], sampling: {sampling}, measures: [rocking_hz])"#
+        )
+    };
+    let linear = |steps: &str| format!(r#"linear(path: "head.coil_diameter_mm", from: 16.0, to: 40.0{steps})"#);
+    let list = |count: usize| format!(r#"values(path: "head.coil_diameter_mm", values: [{}])"#, "20.0,".repeat(count));
+    let log = |k: usize| format!(r#"log(path: "head.coil_diameter_mm", from: 16.0, to: 40.0, name: Some("a{k}"))"#);
+    let many: String = (0..1001).map(|k| log(k) + ",").collect();
+    let twenty: String = (0..20).map(|k| log(k) + ",").collect();
+    let shipped = |name: &str, from: &str, to: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/studies").join(name);
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(text.contains(from), "{name}: {from}");
+        text.replacen(from, to, 1)
+    };
+    for (name, text, words) in [
+        (
+            "most",
+            spring(&linear(", steps: Some(9223372036854775807)"), "grid"),
+            "9223372036854775807 steps: expected at most 10000",
+        ),
+        ("more", spring(&linear(", steps: Some(5000000000)"), "grid"), "5000000000 steps: expected at most 10000"),
+        ("values", spring(&list(10_001), "grid"), "10001 values: expected at most 10000"),
+        ("axes", spring(&many, "sobol(count: 8)"), "1001 axes: expected at most 1000"),
+        (
+            "count",
+            spring(&linear(""), "latin_hypercube(count: 18446744073709551615, seed: 1)"),
+            "expected 1 to 10000000",
+        ),
+        ("both", spring(&twenty, "latin_hypercube(count: 9000000, seed: 1)"), "expected at most 5000000 samples"),
+        ("blocks", shipped("timing.ron", "block_s: 5.0", "block_s: 1e-300"), "expected at most 10000"),
+        (
+            "seeds",
+            shipped("timing.ron", "seeds: [", &format!("seeds: [{}", "1,".repeat(10_001))),
+            "expected at most 10000",
+        ),
+        (
+            "evaluated",
+            shipped("spring_design.ron", "evaluations: 10000", "evaluations: 9223372036854775807"),
+            "at most 1000000",
+        ),
+        ("verified", shipped("spring_design.ron", "candidates: 16", "candidates: 9223372036854775807"), "at most 1000"),
+        ("designs", shipped("spring_office.ron", "designs: 60", "designs: 9223372036854775807"), "at most 10000"),
+    ] {
+        let file = format!("{name}.ron");
+        std::fs::write(here.path().join(&file), text).unwrap();
+        for command in ["check", if words.contains("at most 1000000") { "spring design" } else { "check" }] {
+            let (code, _, stderr) = run(here.path(), &format!("{command} {file}"));
+            assert!(code == 2 && stderr.contains(words), "`{command} {name}`: {code} {stderr}");
+        }
+    }
+    let coil = "coil(coil_diameter_mm: 25.0, wire_diameter_mm: 3e-6, active_coils: 1e9, free_length_mm: 150.0, material: spring_steel)";
+    std::fs::write(here.path().join("coil.ron"), coil).unwrap();
+    let (code, _, stderr) = run(here.path(), "spring export coil.ron --out robot");
+    assert!(code == 1 && stderr.contains("1e9 active coils; expected at most 1000"), "{code} {stderr}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_recording_larger_than_the_disk_is_not_started() {

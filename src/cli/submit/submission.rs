@@ -21,8 +21,11 @@ pub(super) struct Submission<'a> {
 impl Submission<'_> {
     /// Memory of an element, MiB.
     pub(super) fn memory_mib(&self) -> u64 {
-        let runs_mib = self.sweep.limit().map_or(SUPERVISOR_MEMORY_MIB, |limit| limit.memory_mib * self.threads as u64);
-        runs_mib + SUPERVISOR_MEMORY_MIB
+        let runs_mib = self
+            .sweep
+            .limit()
+            .map_or(SUPERVISOR_MEMORY_MIB, |limit| limit.memory_mib.saturating_mul(self.threads as u64));
+        runs_mib.saturating_add(SUPERVISOR_MEMORY_MIB)
     }
 
     /// Replaces the file `name` in the subfolder `subfolder` of the sweep; returns its path.

@@ -4,6 +4,8 @@ use super::Disturbance;
 use serde::{Deserialize, Serialize};
 use zsim_base::spec::checked;
 
+/// Maximum number of blocks of the bootstrap: all resamples of them are in memory.
+const MAX_BLOCKS: f64 = 10_000.0;
 /// Maximum magnitude of latency and noise, ms: the search range of the clock estimation.
 const MAX_TIMING_ERROR_MS: f64 = 20.0;
 
@@ -45,6 +47,13 @@ impl TimingSpec {
         }
         if duration_s < 2.0 * self.block_s {
             return Err(format!("two blocks of {} s do not fit into {duration_s} s", self.block_s));
+        }
+        if duration_s > MAX_BLOCKS * self.block_s {
+            let blocks = duration_s / self.block_s;
+            return Err(format!(
+                "`block_s` {} s gives {blocks:.3e} blocks in {duration_s} s: expected at most {MAX_BLOCKS}",
+                self.block_s
+            ));
         }
         Ok(())
     }

@@ -6,6 +6,12 @@ use zsim_base::spec::{Source, SpecError};
 
 /// Maximum number of runs of a sweep: limits the plan's memory and the table of runs.
 pub(super) const MAX_RUNS: u64 = 10_000_000;
+/// Maximum number of axes, of values of an axis, and of seeds: each value is checked when the plan is made.
+const MAX_AXES: usize = 1000;
+const MAX_LEVELS: usize = 10_000;
+const MAX_SEEDS: usize = 10_000;
+/// Maximum number of coordinates of a sampled design, axes times samples: they are in memory.
+const MAX_COORDINATES: usize = 100_000_000;
 
 /// Checks the fields of a spec against each other.
 pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
@@ -23,6 +29,7 @@ pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> 
     if !is_journey && !spec.seeds.is_empty() {
         return Err(about("seeds", "only journeys have seeds: remove `seeds`".to_owned()));
     }
+    check_sizes(spec, source)?;
     if let Some(twice) = duplicate(&spec.seeds) {
         return Err(about("seeds", format!("`seeds` contains {twice} more than once")));
     }
@@ -60,6 +67,31 @@ pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> 
     };
     if !(1..=MAX_RUNS as usize).contains(&count) {
         return Err(about("count", format!("{count} samples: expected 1 to {MAX_RUNS}")));
+    }
+    if count > MAX_COORDINATES / spec.axes.len() {
+        let (axes, most) = (spec.axes.len(), MAX_COORDINATES / spec.axes.len());
+        return Err(about("count", format!("{count} samples of {axes} axes: expected at most {most} samples")));
+    }
+    Ok(())
+}
+
+/// Checks the numbers of axes, of their values and of seeds.
+fn check_sizes(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
+    for (key, found, most) in [("axes", spec.axes.len(), MAX_AXES), ("seeds", spec.seeds.len(), MAX_SEEDS)] {
+        if found > most {
+            return Err(SpecError::about(source, key, format!("{found} {key}: expected at most {most}")));
+        }
+    }
+    for axis in &spec.axes {
+        let (key, found) = match axis {
+            AxisSpec::Values { values, .. } => ("values", values.len()),
+            AxisSpec::Levels { levels, .. } => ("levels", levels.len()),
+            AxisSpec::Linear { steps, .. } | AxisSpec::Log { steps, .. } => ("steps", steps.unwrap_or_default()),
+        };
+        if found > MAX_LEVELS {
+            let message = format!("axis \"{}\": {found} {key}: expected at most {MAX_LEVELS}", axis.name());
+            return Err(SpecError::about_after(source, &axis.anchor(), key, message));
+        }
     }
     Ok(())
 }

@@ -81,8 +81,31 @@ const SAMPLED_FRACTION: f64 = 0.4;
 const EXPLORED: f64 = 0.5;
 const EXPLORED_WITH_JOURNEYS: f64 = 0.05;
 
+/// Maximum numbers of evaluations, of verified designs, and of designs and seeds of journeys: their results are in memory.
+const MAX_EVALUATIONS: usize = 1_000_000;
+const MAX_CANDIDATES: usize = 1000;
+const MAX_DESIGNS: usize = 10_000;
+const MAX_SEEDS: usize = 1000;
+
 /// Maximum number of simulated designs over the number of requested candidates: rejected ones are replaced.
 const MAX_SIMULATED: usize = 4;
+
+/// Checks the counts of a spec.
+fn check_counts(spec: &DesignSpec, source: &Source) -> Result<(), SpecError> {
+    let journey = spec.journey.as_ref();
+    let counts = [
+        ("evaluations", spec.evaluations, MAX_EVALUATIONS),
+        ("candidates", spec.candidates, MAX_CANDIDATES),
+        ("designs", journey.map_or(0, |journey| journey.designs), MAX_DESIGNS),
+        ("seeds", journey.map_or(0, |journey| journey.seeds.len()), MAX_SEEDS),
+    ];
+    match counts.into_iter().find(|(_, found, most)| found > most) {
+        None => Ok(()),
+        Some((key, found, most)) => {
+            Err(SpecError::about(source, key, format!("{found} {key}: expected at most {most}")))
+        }
+    }
+}
 
 impl DesignSearch {
     /// Creates the search that `spec`, read from `source`, describes.
@@ -106,6 +129,7 @@ impl DesignSearch {
         if spec.evaluations == 0 || spec.candidates == 0 {
             return Err(SpecError::about(source, "evaluations", "evaluations and candidates must be at least 1").into());
         }
+        check_counts(spec, source)?;
         let space = Space::of(spec, source)?;
         for goal in &spec.goals {
             if let Some(missing) = space.missing_for(goal.measure) {
