@@ -175,6 +175,30 @@ fn requests_in_the_name_of_another_site_are_refused() {
     drop(silent);
 }
 
+#[test]
+fn clients_that_never_read_or_never_ask_do_not_starve_a_page() {
+    let here = tempfile::tempdir().unwrap();
+    let mut live = LiveRun::start(here.path(), "--quiet --scene office --duration 2000s --out out --live");
+    let connect = |request: &str| {
+        let mut stream = TcpStream::connect(live.address).unwrap();
+        stream.write_all(request.as_bytes()).unwrap();
+        stream
+    };
+    let request = format!("GET / HTTP/1.1\r\nHost: {}\r\n\r\n", live.address);
+    let mut hostile: Vec<TcpStream> = Vec::new();
+    // Clients that ask and never read, that never ask, and that ask without end.
+    for (name, count, request) in [("silent", 100, &*request), ("idle", 200, ""), ("slow", 100, "GET / HTT")] {
+        hostile.extend((0..count).map(|_| connect(request)));
+        let started = Instant::now();
+        assert!(live.get("/").head.starts_with("HTTP/1.1 200 "), "{name}");
+        assert!(live.get("/updates?viewer=7").head.starts_with("HTTP/1.1 200 "), "{name}");
+        let elapsed = started.elapsed();
+        assert!(elapsed < Duration::from_secs(8), "{name}: {elapsed:?}");
+    }
+    live.child.kill().unwrap();
+    live.child.wait().unwrap();
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_the_run_and_its_page() {

@@ -3,6 +3,7 @@
 //! The run passes its data to a queue that never blocks it. A thread keeps the state of the run for the pages, and
 //! another one serves them. Neither changes the results.
 
+mod connections;
 mod frame;
 mod growing;
 mod map;

@@ -3,6 +3,7 @@
 //! A page asks for an update with what it has; the answer waits until there is something new. The server keeps nothing
 //! for each page, so that pages can come and go. A connection is closed after one answer.
 
+use super::connections::{Connection, Connections};
 use super::request::UpdateRequest;
 use super::shared::Shared;
 use std::io::{Error, ErrorKind, Read, Write};
@@ -11,18 +12,18 @@ use std::sync::Arc;
 use std::thread::{Builder, sleep};
 use std::time::{Duration, Instant};
 
-/// Maximum number of connections; a browser opens up to six.
-const MAX_CONNECTIONS: usize = 64;
 /// Maximum length of the head of a request, bytes, and maximum number of its header fields.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 const MAX_FIELDS: usize = 64;
 /// Time for the head of a request.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
-/// Time that a page may take to receive some of an answer.
+/// Time that a page may take to receive an answer.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
+/// Maximum number of bytes that are written at once.
+const CHUNK_BYTES: usize = 64 << 10;
 /// An answer without news is sent after this time.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
-/// Waiting time while there are too many connections or open files.
+/// Waiting time while all connections are needed, or too many files are open.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// Header fields of all answers: pages of other sites must not embed them.
 const FIELDS: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n\
@@ -52,34 +53,56 @@ pub(super) fn start(port: u16, shared: Arc<Shared>) -> std::io::Result<SocketAdd
 
 /// Serves each connection in a thread of its own.
 fn serve(listener: &TcpListener, address: SocketAddr, shared: &Arc<Shared>) {
-    // Each connection has a clone, so that the number of references is the number of connections and one.
-    let connections = Arc::new(());
+    let connections = Arc::new(Connections::default());
     loop {
-        let accepted = (Arc::strong_count(&connections) <= MAX_CONNECTIONS).then(|| listener.accept());
-        let Some(Ok((stream, _))) = accepted else {
+        let Ok((stream, _)) = listener.accept() else {
             sleep(ACCEPT_PAUSE);
             continue;
         };
-        let (connection, shared) = (connections.clone(), shared.clone());
+        while !connections.make_room() {
+            sleep(ACCEPT_PAUSE);
+        }
+        let (connection, shared) = (connections.add(stream), shared.clone());
         let answer = move || {
             // A browser may close its connection at any time.
-            let _ = answer_request(stream, address, &shared);
-            drop(connection);
+            let _ = answer_request(&connection, address, &shared);
         };
         // Without a thread the connection is closed.
         let _ = Builder::new().name("live page".to_owned()).spawn(answer);
     }
 }
 
-fn answer_request(mut stream: TcpStream, address: SocketAddr, shared: &Shared) -> std::io::Result<()> {
-    let answer = match Head::read(&mut stream)? {
+fn answer_request(connection: &Connection, address: SocketAddr, shared: &Shared) -> std::io::Result<()> {
+    let head = Head::read(connection.stream())?;
+    connection.answers();
+    let answer = match head {
         Some(head) => head.answer(address, shared),
         None => Answer::new(BAD_REQUEST, TEXT, "the request is not valid, or its head is too long"),
     };
-    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+    connection.writes();
     let Answer { status, content, body } = answer;
-    write!(stream, "HTTP/1.1 {status}\r\nContent-Type: {content}\r\nContent-Length: {}\r\n{FIELDS}\r\n", body.len())?;
-    stream.write_all(&body)
+    let length = body.len();
+    let head = format!("HTTP/1.1 {status}\r\nContent-Type: {content}\r\nContent-Length: {length}\r\n{FIELDS}\r\n");
+    write_in_time(connection.stream(), &[head.as_bytes(), &body].concat())
+}
+
+/// Writes an answer within [`WRITE_TIMEOUT`] in all, also to a page that reads a byte at a time.
+fn write_in_time(mut stream: &TcpStream, bytes: &[u8]) -> std::io::Result<()> {
+    let end = Instant::now() + WRITE_TIMEOUT;
+    for chunk in bytes.chunks(CHUNK_BYTES) {
+        stream.set_write_timeout(Some(time_until(end)?))?;
+        stream.write_all(chunk)?;
+    }
+    Ok(())
+}
+
+/// The time left.
+///
+/// # Errors
+/// When there is none.
+fn time_until(end: Instant) -> std::io::Result<Duration> {
+    let left = end.saturating_duration_since(Instant::now());
+    if left.is_zero() { Err(Error::from(ErrorKind::TimedOut)) } else { Ok(left) }
 }
 
 /// The head of a request.
@@ -92,15 +115,11 @@ struct Head {
 
 impl Head {
     /// Reads a head; `None` if it is not valid or too long.
-    fn read(stream: &mut TcpStream) -> std::io::Result<Option<Self>> {
+    fn read(mut stream: &TcpStream) -> std::io::Result<Option<Self>> {
         let end = Instant::now() + HEAD_TIMEOUT;
         let (mut bytes, mut chunk) = (Vec::new(), [0; 4096]);
         while bytes.len() < MAX_HEAD_BYTES {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Err(Error::from(ErrorKind::TimedOut));
-            }
-            stream.set_read_timeout(Some(left))?;
+            stream.set_read_timeout(Some(time_until(end)?))?;
             match stream.read(&mut chunk)? {
                 0 => return Err(Error::from(ErrorKind::UnexpectedEof)),
                 count => bytes.extend_from_slice(&chunk[..count]),
