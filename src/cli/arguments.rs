@@ -98,15 +98,16 @@ impl ScenarioArguments {
     pub(super) fn inputs(&self, scene: &str) -> Vec<PathBuf> {
         let scenario = self.scenario(scene);
         let names = [
-            (Kind::Scene, &scenario.scene),
-            (Kind::Head, &scenario.head),
-            (Kind::Motion, &scenario.motion),
-            (Kind::Lidar, &scenario.lidar),
-            (Kind::Imu, &scenario.imu),
-            (Kind::Clock, &scenario.clock),
+            (Kind::Scene, Some(&scenario.scene)),
+            (Kind::Head, Some(&scenario.head)),
+            (Kind::Motion, Some(&scenario.motion)),
+            (Kind::Lidar, Some(&scenario.lidar)),
+            (Kind::Imu, Some(&scenario.imu)),
+            (Kind::Imu, scenario.base_imu.as_ref()),
+            (Kind::Clock, Some(&scenario.clock)),
+            (Kind::Faults, scenario.faults.as_ref()),
         ];
-        let sources = names.into_iter().filter_map(|(kind, name)| find(kind, name).ok());
-        let files = sources.filter(|source| source.folder.is_some()).map(|source| PathBuf::from(source.name));
+        let files = names.into_iter().filter_map(|(kind, name)| spec_file(kind, name?));
         let recorded = zsim_motion::load(&scenario.motion).ok().and_then(|(spec, source)| spec.recorded_file(&source));
         files.chain(recorded).collect()
     }
@@ -124,6 +125,11 @@ pub(super) struct EstimatorSettings {
 }
 
 impl EstimatorSettings {
+    /// The file of the settings; `None` if they are built in.
+    pub(super) fn file(&self) -> Option<PathBuf> {
+        spec_file(Kind::Estimator, &self.estimator)
+    }
+
     pub(super) fn spec(&self) -> anyhow::Result<EstimatorSpec> {
         let mut estimator = zsim_estimation::load(&self.estimator)?;
         estimator.fixed_views = self.fixed_views.unwrap_or(estimator.fixed_views);
@@ -136,7 +142,7 @@ impl EstimatorSettings {
 #[derive(Args)]
 pub(super) struct EstimatorArguments {
     #[command(flatten)]
-    settings: EstimatorSettings,
+    pub settings: EstimatorSettings,
     /// Stop before the global registration
     #[arg(long)]
     open_loop: bool,
@@ -183,6 +189,12 @@ impl EstimatorArguments {
         let cloud = (!self.metrics_only).then_some(options);
         Ok(EstimateOptions { closed_loop: !self.open_loop, cloud, ..EstimateOptions::with(estimator) })
     }
+}
+
+/// The file of a spec; `None` for a built-in one.
+pub(super) fn spec_file(kind: Kind, name: &str) -> Option<PathBuf> {
+    let source = find(kind, name).ok()?;
+    source.folder.is_some().then(|| PathBuf::from(source.name))
 }
 
 /// Where results go.

