@@ -69,27 +69,45 @@ pub(super) fn folder_to_resume(wanted: &Path) -> anyhow::Result<Folder> {
     Folder::locked(wanted)?.ok_or_else(|| anyhow!(in_use(wanted)))
 }
 
-fn in_use(folder: &Path) -> String {
-    format!("{} is in use by another zsim: wait until it ends, or name another folder with --out", folder.display())
+/// Locks a folder that several processes may use at the same time, against those that need it alone.
+///
+/// # Errors
+/// When it cannot be read, or another process needs it alone.
+pub(super) fn shared_folder(path: &Path) -> anyhow::Result<Folder> {
+    Folder::locked_by(path, File::try_lock_shared)?.ok_or_else(|| anyhow!(in_use(path)))
+}
+
+/// The error for an output that another process writes.
+pub(super) fn in_use(path: &Path) -> String {
+    format!("{} is in use by another zsim: wait until it ends, or pass another path with --out", path.display())
 }
 
 impl Folder {
     /// Locks the folder at `path`; `None` when another process has locked it.
     ///
-    /// The lock is on the folder itself, so that no lock file remains. Where the system cannot lock a folder (some
-    /// network file systems, Windows) it is used without a lock.
+    /// The lock is on the folder itself, so that no lock file remains.
     fn locked(path: &Path) -> anyhow::Result<Option<Self>> {
-        let folder = |lock| Some(Self { path: path.to_owned(), _lock: lock });
+        Self::locked_by(path, File::try_lock)
+    }
+
+    fn locked_by(path: &Path, lock: fn(&File) -> Result<(), TryLockError>) -> anyhow::Result<Option<Self>> {
         if !cfg!(unix) {
-            return Ok(folder(None));
+            return Ok(Some(Self { path: path.to_owned(), _lock: None }));
         }
         let handle = File::open(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        match handle.try_lock() {
-            Ok(()) => Ok(folder(Some(handle))),
-            Err(TryLockError::WouldBlock) => Ok(None),
-            Err(TryLockError::Error(_)) => Ok(folder(None)),
-        }
+        Ok(is_locked(lock(&handle)).then(|| Self { path: path.to_owned(), _lock: Some(handle) }))
     }
+}
+
+/// Whether no other process has the lock. Where the system has no such locks (some network file systems), nobody has.
+fn is_locked(result: Result<(), TryLockError>) -> bool {
+    !matches!(result, Err(TryLockError::WouldBlock))
+}
+
+/// Locks a file against other processes until it is closed; `false` when another process has locked it.
+pub(super) fn lock_file(file: &File) -> bool {
+    // On Windows a lock would also exclude other handles of this process.
+    !cfg!(unix) || is_locked(file.try_lock())
 }
 
 /// A new file for results: `wanted`, or `wanted` with a number before its ending.
@@ -204,7 +222,8 @@ pub(super) fn print(text: &str) -> anyhow::Result<()> {
 
 /// Writes to stdout without escapes; a closed pipe is not an error.
 pub(super) fn write_to_stdout(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("stdout cannot be written"),
         _ => Ok(()),
     }

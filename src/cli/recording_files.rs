@@ -1,9 +1,9 @@
 //! The files of a simulated recording, reserved before anything is computed.
 
-use super::output::{candidates, check_not_inputs, create_parent};
+use super::output::{candidates, check_not_inputs, create_parent, in_use, lock_file};
 use super::usage::Usage;
 use anyhow::{Context, bail, ensure};
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use zsim_recording::other_format;
@@ -41,6 +41,8 @@ pub(super) struct RecordingFiles {
     /// Final path of the complete recording, if it is written under a temporary name.
     replaces: Option<PathBuf>,
     is_finished: bool,
+    /// Locks the recording against other processes; the system releases it when the process ends for any reason.
+    _lock: File,
 }
 
 impl RecordingFiles {
@@ -48,8 +50,8 @@ impl RecordingFiles {
     /// permits to replace them. No file of `inputs` is ever replaced.
     ///
     /// # Errors
-    /// When the ending is that of another format, two of the files would be one, an input would be replaced, or they cannot be
-    /// created.
+    /// When the ending is that of another format, two of the files would be one, an input would be replaced, another process
+    /// writes the files, or they cannot be created.
     pub fn reserve(wanted: &Path, companions: &[Companion], force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
         if let Some(same) = Companion::ALL.iter().find(|companion| is_same_name(&companion.of(wanted), wanted)) {
             let message = format!(
@@ -70,6 +72,7 @@ impl RecordingFiles {
         if !(force && outputs.iter().any(|path| path.exists())) {
             return Self::first_free(wanted, companions, None);
         }
+        ensure!(!is_locked(wanted), in_use(wanted));
         let truth = Companion::Truth.of(wanted);
         ensure!(
             companions.contains(&Companion::Truth) || !truth.exists(),
@@ -95,12 +98,16 @@ impl RecordingFiles {
     /// [`finish`](Self::finish) then moves them to `replaces`, if given.
     fn first_free(wanted: &Path, companions: &[Companion], replaces: Option<&Path>) -> anyhow::Result<Self> {
         for recording in candidates(wanted) {
-            if !is_created(&recording)? {
+            let Some(lock) = create_locked(&recording)? else {
+                // A run that was killed leaves an unlocked file.
+                if let Some(replaced) = replaces.filter(|_| is_locked(&recording)) {
+                    bail!(in_use(replaced));
+                }
                 continue;
-            }
+            };
             // Dropped, it removes what it has created.
-            let mut files =
-                Self { recording, companions: vec![], replaces: replaces.map(Path::to_owned), is_finished: false };
+            let replaces = replaces.map(Path::to_owned);
+            let mut files = Self { recording, companions: vec![], replaces, is_finished: false, _lock: lock };
             if files.reserves_all(companions)? {
                 return Ok(files);
             }
@@ -191,6 +198,32 @@ fn replace(from: &Path, to: &Path) -> anyhow::Result<()> {
     std::fs::rename(from, to).with_context(|| format!("{} cannot be moved to {}", from.display(), to.display()))
 }
 
+/// Creates an empty file that is locked; `None` if the name exists, even as a dangling link.
+fn create_locked(path: &Path) -> anyhow::Result<Option<File>> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let failed = || format!("{} cannot be created", path.display());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // It gets its name when it is locked, so that no other process finds it without the lock.
+    let file = builder.prefix(".partial-").tempfile_in(folder).with_context(failed)?;
+    lock_file(file.as_file());
+    match file.persist_noclobber(path) {
+        Ok(file) => Ok(Some(file)),
+        Err(error) if error.error.kind() == ErrorKind::AlreadyExists => Ok(None),
+        Err(error) => Err(error.error).with_context(failed),
+    }
+}
+
+/// Whether another process has locked a file. Processes that only ask do not exclude each other.
+fn is_locked(path: &Path) -> bool {
+    let is_excluded = |file: File| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock));
+    cfg!(unix) && path.is_file() && File::open(path).is_ok_and(is_excluded)
+}
+
 /// Creates an empty file; `false` if the name exists, even as a dangling link.
 fn is_created(path: &Path) -> anyhow::Result<bool> {
     match OpenOptions::new().write(true).create_new(true).open(path) {
@@ -229,6 +262,28 @@ mod tests {
             assert!(RecordingFiles::reserve(&here.path().join(name), ALL, true, &[]).is_err());
         }
         assert!(RecordingFiles::reserve(Path::new(""), ALL, true, &[]).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_process_at_a_time_replaces_a_recording() {
+        let here = tempfile::tempdir().unwrap();
+        let wanted = here.path().join("run.mcap");
+        let reserve = |force| RecordingFiles::reserve(&wanted, ALL, force, &[]);
+        let is_in_use = || reserve(true).err().unwrap().to_string().contains("run.mcap is in use by another zsim");
+        let first = reserve(false).unwrap();
+        assert!(is_in_use(), "the first writes it in place");
+        std::fs::write(first.recording(), "first").unwrap();
+        first.finish().unwrap();
+        // A run that was killed has left its files.
+        std::fs::write(here.path().join("run.partial.mcap"), "killed").unwrap();
+        let second = reserve(true).unwrap();
+        assert_eq!(second.recording(), here.path().join("run.partial-2.mcap"));
+        assert!(is_in_use(), "the second will replace it");
+        std::fs::write(second.recording(), "second").unwrap();
+        second.finish().unwrap();
+        assert_eq!(std::fs::read_to_string(&wanted).unwrap(), "second");
+        assert!(reserve(true).is_ok());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `zsim study`: a sweep from its spec to its tables.
 
 use super::arguments::Global;
-use super::{Completion, sweep};
+use super::{Completion, output, sweep};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim_study::sweep::Shard;
@@ -30,6 +30,8 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let plan = sweep::plan_of(&arguments.file)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
+    sweep::check_spec_stays(&arguments.file, &folder)?;
+    let folder = output::folder_to_resume(&folder)?;
     let planned = plan.write(&folder, arguments.force)?;
     if arguments.keep_runs {
         // Refuse a study without files to keep before its first run.

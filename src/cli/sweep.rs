@@ -1,6 +1,6 @@
 //! `zsim sweep`: plan, run, status, merge, submit.
 
-use super::arguments::Global;
+use super::arguments::{Global, spec_file};
 use super::bars::{WorkBar, end_polling, stop_flag};
 use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
@@ -109,7 +109,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         Command::Status(folder) => {
             print_status(global, &Sweep::open(&folder.folder)?.status(Shard::WHOLE)?, &folder.folder)
         }
-        Command::Merge(folder) => merge(&Sweep::open(&folder.folder)?, &folder.folder, global),
+        Command::Merge(FolderArguments { folder }) => {
+            let sweep = Sweep::open(folder)?;
+            merge(&sweep, &output::shared_folder(folder)?, global)
+        }
         Command::Repeat(repeat) => repeat::run(repeat, global),
         Command::Submit(arguments) => submit::run(arguments, global),
         Command::Task(task) => run_task(task),
@@ -129,9 +132,17 @@ pub(super) fn plan_of(name: &str) -> anyhow::Result<Plan> {
     Ok(Plan::new(&stem, &spec, &source)?)
 }
 
+/// Rejects a plan that would replace the file of its own spec.
+pub(super) fn check_spec_stays(spec: &str, folder: &Path) -> anyhow::Result<()> {
+    let inputs: Vec<PathBuf> = spec_file(Kind::Study, spec).into_iter().collect();
+    output::check_not_inputs(&inputs, &["plan.ron", "points.csv"].map(|name| folder.join(name)))
+}
+
 fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Completion> {
     let plan = plan_of(&arguments.spec)?;
     let folder = arguments.out.clone().unwrap_or_else(|| Path::new("results").join(plan.name()));
+    check_spec_stays(&arguments.spec, &folder)?;
+    let folder = output::folder_to_resume(&folder)?;
     let sweep = plan.write(&folder, arguments.force)?;
     let figures = json!({ "points": plan.points(), "tasks": sweep.tasks() });
     output::print_result(global, &plan_text(&sweep), figures, Some(&folder))?;
@@ -140,6 +151,7 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
 
 fn run_shard(arguments: &RunArguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
+    let _lock = output::shared_folder(&arguments.folder)?;
     let shard = shard(arguments)?;
     if arguments.keep_runs {
         // Refuse a sweep without files to keep before its first run.
