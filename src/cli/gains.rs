@@ -4,10 +4,10 @@ use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
 use super::usage::Usage;
 use super::{Completion, output};
-use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim_base::files::subfolder;
 use zsim_base::random::Seed;
 use zsim_dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim_motion::Axis;
@@ -85,8 +85,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         arguments.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/gains-{}", name(arguments))));
     let folder = output::folder(&wanted, arguments.out.force)?;
     replace_text(&folder.join("gains.csv"), &csv(&curves))?;
-    let plots = folder.join("plots");
-    std::fs::create_dir_all(&plots).with_context(|| format!("cannot create {}", plots.display()))?;
+    let plots = subfolder(&folder, "plots")?;
     gain_figure(&curves).save(&plots, "gains")?;
     coherence_figure(&curves).save(&plots, "coherence")?;
     if let Some(swings) = &swings {

@@ -32,8 +32,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
-    let wanted = arguments.out.clone().unwrap_or_else(|| sweep.run_folder(arguments.run));
+    let _lock = output::shared_folder(&arguments.folder)?;
     sweep.check_repeat(arguments.run)?;
+    let wanted = arguments.out.clone().map_or_else(|| sweep.create_run_folder(arguments.run), Ok)?;
     let mut bars = Bars::new(global);
     // The run's own folder is written again unless it is complete.
     let is_partial = arguments.out.is_none() && !wanted.join("metrics.json").is_file();
@@ -69,7 +70,7 @@ pub(super) fn keep_runs(sweep: &Sweep, shard: Shard, global: &Global) -> anyhow:
     for (done, number) in numbers.iter().enumerate() {
         bar.set_fraction(done as f64 / numbers.len() as f64);
         bar.set_task(format!("run {number}"));
-        let folder = output::folder(&sweep.run_folder(*number), true)?;
+        let folder = output::folder(&sweep.create_run_folder(*number)?, true)?;
         let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |_| () };
         match sweep.repeat(*number, &folder, &mut watch) {
             Err(error @ StudyError::Stopped) => return Err(error.into()),

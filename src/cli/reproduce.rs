@@ -8,6 +8,7 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use zsim_base::files::subfolder;
 use zsim_study::replace_text;
 use zsim_study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_page, paper_table};
 use zsim_study::sweep::Runner;
@@ -58,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         bar.set_task(experiment.name.clone());
         let on_progress = |fraction: f64| bar.set_fraction(fraction);
         let runner = Runner { program: &program, stop: stop_flag(), on_progress: &on_progress };
-        let result = experiment.run(&folder.join(&experiment.name), extent, arguments.force, &runner)?;
+        let result = experiment.run(&subfolder(&folder, &experiment.name)?, extent, arguments.force, &runner)?;
         found.push(Finding { experiment: experiment.clone(), result: Some(result) });
         table(arguments, extent, &folder, &found)?;
         end_polling();

@@ -8,7 +8,9 @@ use super::{output, recording_size};
 use anyhow::Context;
 use clap::Args;
 use serde_json::json;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 use zsim_recording::write_rosbag2_metadata;
 use zsim_simulation::{Outputs, Simulation, SimulationSummary};
 use zsim_study::{self, ProgressMonitor, ViewerFiles};
@@ -96,7 +98,8 @@ fn companions(viewers: Option<&ViewerFiles>) -> Vec<Companion> {
 fn write_for_viewers(viewers: &ViewerFiles, files: &RecordingFiles) -> anyhow::Result<()> {
     let contents = [(Companion::Layout, Some(viewers.layout)), (Companion::HeadModel, viewers.head_model.as_deref())];
     for (path, text) in contents.into_iter().filter_map(|(of, text)| files.companion(of).zip(text)) {
-        std::fs::write(&path, text).with_context(|| format!("{} cannot be written", path.display()))?;
+        let written = files::create(&path).and_then(|mut file| file.write_all(text.as_bytes()));
+        written.with_context(|| format!("{} cannot be written", path.display()))?;
     }
     Ok(())
 }

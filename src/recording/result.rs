@@ -7,6 +7,7 @@ use crate::topics::{MAP, Topic};
 use crate::{CloudPoint, RecordingError};
 use std::collections::BTreeMap;
 use std::path::Path;
+use zsim_base::files;
 use zsim_base::geometry::{Pose, PoseCovariance, Trajectory};
 use zsim_base::time::{Span, Stamp};
 
@@ -34,7 +35,7 @@ pub fn write_result(
     covariances: &[(Stamp, PoseCovariance)],
     cloud: impl IntoIterator<Item = CloudPoint>,
 ) -> Result<(), RecordingError> {
-    let file = std::fs::File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+    let file = files::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
     let mcap = McapWriter::new(file, BTreeMap::new())?;
     let mut result = ResultWriter { mcap, body_frame, covariances, last: Stamp::from_nanos(0), gathered: Vec::new() };
     result.path(map_from_body)?;

@@ -3,7 +3,9 @@
 use crate::folder::METADATA_FILE;
 use crate::topics::Topic;
 use crate::{Reader, RecordingError, TopicInfo};
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 use zsim_base::time::Span;
 
 /// Version of the format: that of ROS 2 Humble, which later distributions read too.
@@ -21,7 +23,9 @@ pub fn write_rosbag2_metadata(recording: &Path) -> Result<PathBuf, RecordingErro
     let path = recording.with_file_name(METADATA_FILE);
     let text = metadata(&name, info.messages, &info.topics);
     let part = path.with_extension("yaml.part");
-    let written = std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, &path));
+    let written = files::create(&part)
+        .and_then(|mut file| file.write_all(text.as_bytes()))
+        .and_then(|()| std::fs::rename(&part, &path));
     written.map_err(|source| RecordingError::File { path: path.clone(), source })?;
     Ok(path)
 }

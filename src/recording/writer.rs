@@ -10,6 +10,7 @@ use crate::topics::{self, Topic};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
+use zsim_base::files;
 use zsim_base::geometry::{Pose, PoseCovariance};
 use zsim_base::measurement::{Calibration, ImuNoise, ImuSample, LidarScan, Sink, SinkError};
 use zsim_base::time::{Span, Stamp};
@@ -68,8 +69,7 @@ impl Writer {
     /// # Errors
     /// When the file cannot be created or written.
     pub fn create(path: &Path, run: RunDescription) -> Result<Self, RecordingError> {
-        let file =
-            std::fs::File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        let file = files::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Self::new(file, run)
     }
 

@@ -9,6 +9,7 @@ use super::result_files::METRICS;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
+use zsim_base::files::subfolder;
 use zsim_base::geometry::{Pose, Trajectory, Vector};
 use zsim_estimation::ReturnClass;
 use zsim_report::Metrics;
@@ -71,8 +72,7 @@ fn outline<'a>(
 
 /// Writes the plots and the page, then `metrics.json`.
 pub(super) fn write(folder: &Path, plots: &[Plot], page: &RunPage) -> Result<(), StudyError> {
-    let pictures = folder.join("plots");
-    std::fs::create_dir_all(&pictures).map_err(StudyError::file(&pictures))?;
+    let pictures = subfolder(folder, "plots").map_err(StudyError::file(folder))?;
     plots.par_iter().try_for_each(|plot| plot.figure.save(&pictures, plot.name))?;
     write_text(folder, &folder.join("report.html"), &page.html()?)?;
     write_metrics(folder, page.metrics)

@@ -5,6 +5,7 @@ use super::atomic_file::PARTIAL_PREFIX;
 use super::viewer_files::{HEAD_MODEL, RECORDING_LAYOUT, RESULT_LAYOUT};
 use std::io::ErrorKind;
 use std::path::Path;
+use zsim_base::files::inside;
 
 /// Written last and removed first: a folder that has it is complete, and all its files are of one run.
 pub(super) const METRICS: &str = "metrics.json";
@@ -41,7 +42,8 @@ pub fn full_run_files() -> Vec<String> {
 /// Removes files of an earlier run from `folder`, in this order, and the partial files of one that was killed; other
 /// files stay.
 pub(super) fn remove(folder: &Path, names: &[String]) -> Result<(), StudyError> {
-    for path in names.iter().map(|name| folder.join(name)) {
+    for name in names {
+        let path = inside(folder, name).map_err(StudyError::file(folder))?;
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(StudyError::file(&path)(error)),
             _ => {}

@@ -9,6 +9,7 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 use zsim_study::sweep::{Plan, SuiteRecording};
 use zsim_study::{ProgressMonitor, replace_text};
 
@@ -47,15 +48,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         return Err(Usage(message).into());
     }
     for name in ["recordings", "truth"] {
-        let path = folder.join(name);
-        std::fs::create_dir_all(&path).with_context(|| format!("{} cannot be created", path.display()))?;
+        files::subfolder(&folder, name)?;
     }
     remove_others(&folder, &suite, earlier.as_ref())?;
     replace_text(&folder.join(SUITE), &(serde_json::to_string_pretty(&suite)? + "\n"))?;
     let bar = WorkBar::new(global, "recording");
     let count = recordings.len();
     for (index, (recording, item)) in recordings.iter().zip(&suite.recordings).enumerate() {
-        let (file, truth) = (folder.join(&item.recording), folder.join(&item.truth));
+        let (file, truth) = (files::inside(&folder, &item.recording)?, files::inside(&folder, &item.truth)?);
         bar.set_task(format!("{} of {count}", index + 1));
         bar.set_fraction(index as f64 / count as f64);
         if !(file.is_file() && truth.is_file()) {
@@ -74,7 +74,8 @@ fn remove_others(folder: &Path, suite: &Suite, earlier: Option<&Suite>) -> anyho
     let mine = suite.recordings.iter().filter(|item| !is_kept(item));
     let theirs =
         earlier.into_iter().flat_map(|earlier| &earlier.recordings).filter(|item| !suite.recordings.contains(item));
-    for path in mine.chain(theirs).flat_map(|item| [folder.join(&item.recording), folder.join(&item.truth)]) {
+    for name in mine.chain(theirs).flat_map(|item| [&item.recording, &item.truth]) {
+        let path = files::inside(folder, name)?;
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 return Err(error).with_context(|| format!("{} cannot be removed", path.display()));

@@ -16,6 +16,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use zsim_base::files;
 use zsim_base::geometry::Vector;
 use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::time::Stamp;
@@ -171,7 +172,7 @@ impl Session {
     ) -> anyhow::Result<Self> {
         let head_from_laser = setup.calibration.head_from_laser;
         let publisher = EstimatePublisher::new(&sensors.found.body_frame, head_from_laser, &mut bridge)?;
-        let recording = folder.map(|folder| File::create(folder.join("recording.mcap"))).transpose()?;
+        let recording = folder.map(|folder| files::create(&folder.join("recording.mcap"))).transpose()?;
         Ok(Self {
             estimator: setup.estimator()?,
             setup,

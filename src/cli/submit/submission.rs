@@ -3,6 +3,7 @@
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use zsim_base::files;
 use zsim_study::replace_text;
 use zsim_study::sweep::Sweep;
 
@@ -30,8 +31,7 @@ impl Submission<'_> {
 
     /// Replaces the file `name` in the subfolder `subfolder` of the sweep; returns its path.
     pub(super) fn write(&self, subfolder: &str, name: &str, text: &str) -> anyhow::Result<PathBuf> {
-        let folder = self.folder.join(subfolder);
-        std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        let folder = files::subfolder(self.folder, subfolder)?;
         replace_text(&folder.join(name), text)?;
         Ok(folder.join(name))
     }

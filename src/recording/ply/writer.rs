@@ -2,6 +2,7 @@ use crate::{CloudPoint, RecordingError};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
+use zsim_base::files;
 use zsim_base::time::Stamp;
 
 /// Size of a written point, bytes.
@@ -28,7 +29,7 @@ impl PlyWriter<File> {
     /// # Errors
     /// When it cannot be created or written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        let file = files::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Self::new(file)
     }
 }

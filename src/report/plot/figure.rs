@@ -3,7 +3,9 @@ use super::merged_lines::merged_lines;
 use super::raster::Raster;
 use super::{Chart, PlotError, font, frame};
 use plotters::prelude::{BitMapBackend, DrawingBackend, IntoDrawingArea, SVGBackend};
+use std::io::Write;
 use std::path::Path;
+use zsim_base::files;
 
 /// SVG units per point; the backends have integer coordinates, so one unit per point would be too coarse.
 const SVG_UNITS_PER_POINT: u32 = 4;
@@ -100,7 +102,8 @@ impl Figure {
     pub fn save(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
         let write = |ending: &str, bytes: &[u8]| {
             let path = folder.join(format!("{name}.{ending}"));
-            std::fs::write(&path, bytes).map_err(|source| PlotError::File { path: path.display().to_string(), source })
+            let written = files::create(&path).and_then(|mut file| file.write_all(bytes));
+            written.map_err(|source| PlotError::File { path: path.display().to_string(), source })
         };
         write("svg", self.svg()?.as_bytes())?;
         write("png", &self.raster()?.png()?)

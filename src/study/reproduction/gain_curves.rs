@@ -11,6 +11,7 @@ use crate::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
 use crate::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
 use std::path::Path;
+use zsim_base::files::subfolder;
 use zsim_base::spec::{self, Named, Source};
 use zsim_dynamics::{DampingSpec, HeadSpec, Peak};
 use zsim_motion::Axis;
@@ -43,8 +44,7 @@ pub(super) fn run(
         .map(|((design, fit), curves)| HeadResponse { design, fit, curves: curves.to_vec() })
         .collect();
     for (response, head) in responses.iter().zip(&damped) {
-        let folder = folder.join(&response.design.letter);
-        std::fs::create_dir_all(&folder).map_err(StudyError::file(&folder))?;
+        let folder = subfolder(folder, &response.design.letter).map_err(StudyError::file(folder))?;
         write_text(&folder, &folder.join("gains.csv"), &csv(&response.curves))?;
         write_text(&folder, &folder.join("head.ron"), &(spec::to_text(head)? + "\n"))?;
     }

@@ -19,10 +19,16 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 use zsim_base::spec::{self, Source, SpecError, to_text};
 
 /// Number of runs that are hashed in parallel and written together to the table of runs.
 const RUNS_PER_GROUP: u64 = 16_384;
+
+/// Folder of the finished runs.
+const PARTS: &str = "parts";
+/// Folder of files being written.
+const TEMPORARY: &str = "tmp";
 
 /// Content of `plan.ron`.
 #[derive(Serialize, Deserialize)]
@@ -69,10 +75,8 @@ impl Plan {
         if !anew && !plan_path(folder).exists() && is_foreign(folder)? {
             return Err(StudyError::FolderMismatch { folder: folder.to_owned() });
         }
-        let temporary = temporary_folder(folder);
-        for each in [&temporary, &parts_folder(folder)] {
-            std::fs::create_dir_all(each).map_err(StudyError::file(each))?;
-        }
+        let create = |name: &str| files::subfolder(folder, name).map_err(StudyError::file(folder));
+        let (temporary, _) = (create(TEMPORARY)?, create(PARTS)?);
         let plan = plan_path(folder);
         let written = temporary.join("points.csv");
         let identity = self.write_points(&temporary, &written)?;
@@ -194,6 +198,9 @@ impl Sweep {
             let message = "contains no sweep: create one with `zsim sweep plan`".to_owned();
             return Err(SpecError::plain(folder.display().to_string(), message).into());
         }
+        for name in [TEMPORARY, PARTS] {
+            files::check_subfolder(folder, Path::new(name)).map_err(StudyError::file(folder))?;
+        }
         let source = Source::read(&path)?;
         let file: PlanFile = spec::parse(&source)?;
         let ours = env!("CARGO_PKG_VERSION");
@@ -287,9 +294,9 @@ fn points_path(folder: &Path) -> PathBuf {
 }
 
 fn parts_folder(folder: &Path) -> PathBuf {
-    folder.join("parts")
+    folder.join(PARTS)
 }
 
 fn temporary_folder(folder: &Path) -> PathBuf {
-    folder.join("tmp")
+    folder.join(TEMPORARY)
 }

@@ -7,6 +7,7 @@ use super::summary::{LevelSummary, Summary};
 use super::{Measure, Sweep};
 use crate::StudyError;
 use crate::atomic_file::write_text;
+use zsim_base::files::subfolder;
 use zsim_report::plot::{Chart, Colour, Figure, Mark, Series, Tick, robust_range};
 use zsim_report::quantity_name;
 
@@ -39,8 +40,7 @@ impl Sweep {
     /// # Errors
     /// If the table is not merged, or if a file cannot be written.
     pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<PlotFile>, StudyError> {
-        let folder = self.folder.join("plots");
-        std::fs::create_dir_all(&folder).map_err(StudyError::file(&folder))?;
+        let folder = subfolder(&self.folder, "plots").map_err(StudyError::file(&self.folder))?;
         let runs = Runs::read(self)?;
         let mut plots = Vec::new();
         let mut save = |name: String, title: String, figure: Figure| {

@@ -6,6 +6,7 @@ use crate::atomic_file::replace_text;
 use crate::result_files::METRICS;
 use crate::{EstimateOptions, EstimateResult, ProgressMonitor, StudyError, simulate_and_estimate};
 use std::path::{Path, PathBuf};
+use zsim_base::files::subfolder;
 use zsim_base::spec;
 use zsim_simulation::Simulation;
 
@@ -25,8 +26,16 @@ impl Sweep {
     /// Folder below the sweep's in which run `number` is kept: `runs/12-1f3a5c7e`, its index and the start of its hash.
     ///
     /// A plan that replaces another one thus never shows a run of the other.
-    pub fn run_folder(&self, number: u64) -> PathBuf {
+    fn run_folder(&self, number: u64) -> PathBuf {
         self.folder.join(self.run_folder_name(number))
+    }
+
+    /// Creates the folder in which run `number` is kept.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    pub fn create_run_folder(&self, number: u64) -> Result<PathBuf, StudyError> {
+        subfolder(&self.folder, self.run_folder_name(number)).map_err(StudyError::file(&self.folder))
     }
 
     fn run_folder_name(&self, number: u64) -> String {

@@ -5,6 +5,7 @@ use super::{BaseSpec, Journey, Measure, Sweep};
 use crate::StudyError;
 use crate::atomic_file::write_text;
 use crate::latency::{ClockState, LatencyResult, MapErrors, csv, curve_figure, map_figure};
+use zsim_base::files::subfolder;
 
 /// A measure of a run with timing errors.
 pub(super) fn figure(errors: &MapErrors, measure: Measure) -> Option<f64> {
@@ -42,7 +43,7 @@ impl Sweep {
         {
             write_text(&self.temporary(), &self.folder.join(name), &text)?;
         }
-        let plots = self.folder.join("plots");
+        let plots = subfolder(&self.folder, "plots").map_err(StudyError::file(&self.folder))?;
         map_figure(study, ClockState::Off).save(&plots, "maps")?;
         map_figure(study, ClockState::On).save(&plots, "maps_clock_on")?;
         curve_figure(study).save(&plots, "curves")?;
