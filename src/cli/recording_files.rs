@@ -6,6 +6,7 @@ use anyhow::{Context, bail, ensure};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 use zsim_recording::other_format;
 
 /// A file next to a recording, with the same name and another ending.
@@ -186,7 +187,7 @@ impl Drop for RecordingFiles {
 
 /// Whether a file is a model of a head as `zsim` writes it.
 fn is_head_model(path: &Path) -> bool {
-    std::fs::read_to_string(path).is_ok_and(|text| text.contains("<robot name=\"zsim_head\">"))
+    files::open(path).and_then(std::io::read_to_string).is_ok_and(|text| text.contains("<robot name=\"zsim_head\">"))
 }
 
 /// Whether two paths in one folder name one file, also where case does not matter.

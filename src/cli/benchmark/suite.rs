@@ -4,6 +4,7 @@ use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 use zsim_study::sweep::{Plan, SuiteRecording};
 
 /// Name of the list in the folder of the benchmark.
@@ -60,7 +61,7 @@ impl Suite {
     /// If it cannot be read, or if a name in it is not the name of a file.
     pub(super) fn read(folder: &Path) -> anyhow::Result<Option<Self>> {
         let path = folder.join(SUITE);
-        let text = match std::fs::read_to_string(&path) {
+        let text = match files::open(&path).and_then(std::io::read_to_string) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             text => text.with_context(|| format!("{} cannot be read", path.display()))?,
         };

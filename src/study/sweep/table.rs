@@ -6,6 +6,7 @@ use csv::{Reader, StringRecord, Writer};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use zsim_base::files;
 
 /// Type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,7 +135,7 @@ fn write_rows(writer: &mut Writer<impl Write>, columns: &[Column]) -> csv::Resul
 
 /// Opens a file; `None` if it does not exist.
 pub(super) fn open(path: &Path) -> Result<Option<File>, StudyError> {
-    match File::open(path) {
+    match files::open(path) {
         Ok(file) => Ok(Some(file)),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(StudyError::file(path)(error)),
