@@ -6,6 +6,7 @@ use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, IntoFont, PathElement, Polygon, RGBColor, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, IntoTextStyle, ShapeStyle};
+use zsim_base::printable::printable_name;
 
 /// A position on the canvas, points, y downwards.
 pub(super) type CanvasPoint = (f64, f64);
@@ -144,13 +145,14 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
         let font = if anchor == Anchor::Sideways { upright.transform(FontTransform::Rotate270) } else { upright };
         let ink = rgb(INK);
         let style = font.into_text_style(self.area).color(&ink).pos(Pos::new(h, v));
-        self.area.draw(&Text::new(text.to_owned(), self.unit(at), style)).map_err(PlotError::drawing)
+        // A control character would make the SVG invalid XML.
+        self.area.draw(&Text::new(printable_name(text), self.unit(at), style)).map_err(PlotError::drawing)
     }
 
     /// The width of a text, points.
     pub(super) fn width_of(&self, text: &str, size: f64) -> Result<f64, PlotError> {
         let font = (font::NAME, size * font::BITMAP_SIZE_PER_EM * self.scale).into_font();
-        let (width, _) = font.box_size(text).map_err(|error| PlotError::Drawing(error.to_string()))?;
+        let (width, _) = font.box_size(&printable_name(text)).map_err(|error| PlotError::Drawing(error.to_string()))?;
         Ok(f64::from(width) / self.scale)
     }
 }

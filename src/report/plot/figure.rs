@@ -132,6 +132,15 @@ mod tests {
     }
 
     #[test]
+    fn control_characters_of_names_are_escaped() {
+        let series = Series::line("a\u{1b}[31m\u{202e}\nb\u{ffff}", Colour::Truth, vec![(0.0, 0.0), (1.0, 1.0)]);
+        let svg = Figure::of(vec![Chart::new("\u{7}title", "x\u{0}", "y").with(series)]).svg().unwrap();
+        let is_forbidden = |c: char| c.is_control() && c != '\n' || ['\u{202e}', '\u{ffff}'].contains(&c);
+        assert!(!svg.contains(is_forbidden), "{svg}");
+        assert!(svg.contains("a\\u{1b}[31m\\u{202e}\\nb\\u{ffff}") && svg.contains("\\u{7}title"), "{svg}");
+    }
+
+    #[test]
     fn a_figure_is_saved_in_both_formats_and_is_reproducible() {
         let folder = tempfile::tempdir().unwrap();
         figure().save(folder.path(), "wave").unwrap();
