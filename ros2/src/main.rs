@@ -13,6 +13,7 @@ mod raw;
 use frame::Frame;
 use futures::StreamExt;
 use futures::channel::mpsc;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Frames from zsim that wait: they are few, or slower than DDS.
@@ -21,18 +22,23 @@ const WAITING_FRAMES: usize = 64;
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
     let Some(Ok(domain)) = arguments.next().map(|text| text.parse()) else {
-        eprintln!(
-            "error: `zsim play` and `zsim live` start this program; its arguments are a ROS domain, 0 to 232, and peers"
+        print_error(
+            "`zsim play` and `zsim live` start this program; its arguments are a ROS domain, 0 to 232, and peers",
         );
         return ExitCode::from(2);
     };
     match run(domain, &arguments.collect::<Vec<_>>()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: DDS: {error}");
+            print_error(&format!("DDS: {error}"));
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints an error to stderr, unless it cannot be written.
+fn print_error(text: &str) {
+    let _ = writeln!(std::io::stderr(), "error: {text}");
 }
 
 fn run(domain: u16, peers: &[String]) -> Result<(), Box<dyn std::error::Error>> {

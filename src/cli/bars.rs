@@ -1,7 +1,7 @@
 //! Progress bars and notes on stderr.
 
 use super::arguments::Global;
-use super::output::printable;
+use super::message;
 pub(super) use super::signals::{end_polling, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -48,8 +48,8 @@ impl Bars {
             return;
         }
         match &self.current {
-            Some((_, bar)) => bar.drawn.suspend(|| eprintln!("note: {}", printable(text))),
-            None => eprintln!("note: {}", printable(text)),
+            Some((_, bar)) => bar.drawn.suspend(|| message::note(text)),
+            None => message::note(text),
         }
     }
 
@@ -79,7 +79,7 @@ impl WorkBar {
 
     /// Prints a note above the bar.
     pub(super) fn note(&self, text: &str) {
-        self.0.drawn.suspend(|| eprintln!("note: {}", printable(text)));
+        self.0.drawn.suspend(|| message::note(text));
     }
 
     /// Sets the name of the current task.

@@ -1,7 +1,7 @@
 //! `zsim base`: the trajectory of the base from the trajectory of the head.
 
 use super::arguments::{Global, OutArguments};
-use super::{Completion, output};
+use super::{Completion, message, output};
 use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
@@ -111,7 +111,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
     output::print_result(global, &words, figures, Some(&folder))?;
     let Some(loss) = loss.filter(|loss| !loss.is_none()) else { return Ok(Completion::Done) };
-    loss.sentences().iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
+    loss.sentences().iter().for_each(|loss| message::loss(loss));
     Ok(Completion::WithLoss)
 }
 

@@ -1,7 +1,7 @@
 //! `zsim check`: are these scenes and specs right?
 
 use super::arguments::{Global, any_route};
-use super::{Completion, output, usage};
+use super::{Completion, message, output, usage};
 use clap::Args;
 use serde_json::json;
 use std::path::Path;
@@ -59,15 +59,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
                 };
                 words += &format!("{file}: {}, OK{count}\n", kind.noun());
                 figures.push(json!({ "file": file, "kind": kind.noun(), "error": null, "warnings": warnings }));
-                warnings
-                    .iter()
-                    .for_each(|warning| eprintln!("warning: {}", output::printable(&format!("{file}: {warning}"))));
+                warnings.iter().for_each(|warning| message::warning(&format!("{file}: {warning}")));
             }
             Err(error) => {
                 let at = error.line_and_column();
                 figures.push(json!({ "file": file, "error": error.to_string(), "message": error.message(),
                     "line": at.map(|at| at.0), "column": at.map(|at| at.1) }));
-                eprintln!("error: {}", output::printable(&error.to_string()));
+                message::error(&error.to_string());
             }
         }
     }

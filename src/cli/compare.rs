@@ -2,12 +2,13 @@
 
 use super::arguments::{Global, OutArguments};
 use super::limit::{Limit, fraction};
-use super::{Completion, output, trajectory_file};
+use super::{Completion, message, output, trajectory_file};
 use anyhow::{Context, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim_base::geometry::Trajectory;
+use zsim_base::printable::printable_name;
 use zsim_evaluation::{Errors, Pairs, TrajectoryErrors};
 use zsim_study::replace_text;
 
@@ -79,8 +80,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let partial = compared.iter().find(|each| each.errors.coverage < LOW_COVERAGE);
     let is_unlimited = !arguments.fail_above.is_empty() && arguments.min_coverage.is_none();
     if let Some(each) = partial.filter(|_| is_unlimited && !global.quiet) {
-        let (name, covered) = (output::printable_name(&each.name), 100.0 * each.errors.coverage);
-        eprintln!("note: {name} covers {covered:.1} % of the truth; --min-coverage 95% would fail on it");
+        let (name, covered) = (printable_name(&each.name), 100.0 * each.errors.coverage);
+        message::note(&format!("{name} covers {covered:.1} % of the truth; --min-coverage 95% would fail on it"));
     }
     Ok(Completion::Done)
 }

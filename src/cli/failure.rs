@@ -1,6 +1,6 @@
 //! Error output and exit codes.
 
-use super::output::printable;
+use super::message;
 use super::signals;
 use super::usage::Usage;
 use std::error::Error;
@@ -14,14 +14,14 @@ use zsim_world::WorldError;
 /// Prints the error with its causes and returns the exit code: that of the signal that stopped the run, 2 for invalid
 /// usage or input, else 1.
 pub(super) fn report(error: &anyhow::Error) -> ExitCode {
-    let mut message = error.to_string();
-    eprintln!("error: {}", printable(&message));
+    let mut text = error.to_string();
+    message::error(&text);
     for cause in error.chain().skip(1).map(ToString::to_string) {
         // A transparent error repeats the text of the cause.
-        if !message.contains(&cause) {
-            eprintln!("  because: {}", printable(&cause));
+        if !text.contains(&cause) {
+            message::line(&format!("  because: {cause}"));
         }
-        message = cause;
+        text = cause;
     }
     if error.chain().any(is_stopped) {
         return ExitCode::from(signals::exit_code());

@@ -4,7 +4,7 @@ use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
 use super::bars::{Bars, end_polling, stop_flag};
 use super::live::LiveArguments;
-use super::{output, recording_size};
+use super::{message, output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -69,7 +69,7 @@ pub(super) fn default_folder(name: &str) -> PathBuf {
 
 /// Prints the folder that has the parts completed before a failure.
 pub(super) fn print_partial_results(folder: &Path) {
-    eprintln!("completed parts are in {}", output::printable(&folder.display().to_string()));
+    message::line(&format!("completed parts are in {}", folder.display()));
 }
 
 /// Time of each part of the estimator, s, and of the open loop in total.
@@ -100,7 +100,7 @@ pub(super) fn print_outcome(
     }
     output::print_result(global, &words, figures, Some(folder))?;
     let Metrics { losses, status, .. } = &outcome.metrics;
-    losses.iter().for_each(|loss| eprintln!("loss: {}", output::printable(&loss.line())));
+    losses.iter().for_each(|loss| message::loss(&loss.line()));
     let is_good = status.as_deref().is_none_or(|status| status == "good");
     Ok(if losses.is_empty() && is_good { Completion::Done } else { Completion::WithLoss })
 }

@@ -1,10 +1,10 @@
 //! `zsim info`: the contents of a recording.
 
 use super::arguments::Global;
-use super::output::printable_name;
-use super::{Completion, output, quantity};
+use super::{Completion, message, output, quantity};
 use clap::Args;
 use std::path::PathBuf;
+use zsim_base::printable::printable_name;
 use zsim_base::time::Span;
 use zsim_recording::{Reader, RecordingInfo, TopicInfo};
 
@@ -27,7 +27,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     if info.loss.is_none() {
         return Ok(Completion::Done);
     }
-    info.loss.sentences().iter().for_each(|loss| eprintln!("loss: {}", output::printable(loss)));
+    info.loss.sentences().iter().for_each(|loss| message::loss(loss));
     Ok(Completion::WithLoss)
 }
 

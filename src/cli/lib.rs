@@ -3,6 +3,9 @@
 //! Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 failed, 2 invalid usage or spec, 3 done
 //! with losses, 130 and 143 stopped by SIGINT and SIGTERM.
 
+// `message` and `output` print: the macros panic when stdout or stderr is closed or full.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod arguments;
 mod bars;
 mod base;
@@ -25,6 +28,7 @@ mod limit;
 mod live;
 mod man;
 mod map;
+mod message;
 mod output;
 mod quantity;
 mod recording_files;
@@ -101,8 +105,16 @@ enum Command {
 
 /// Parses the arguments, runs the command, and returns the exit code.
 pub fn run() -> ExitCode {
-    // clap itself prints help (code 0) and complaints about usage (code 2).
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        // Help and version (code 0), or invalid usage (code 2).
+        Err(message) => {
+            let printed = message.print();
+            let is_lost =
+                !message.use_stderr() && printed.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe);
+            return ExitCode::from(if is_lost { 1 } else { u8::try_from(message.exit_code()).unwrap_or(2) });
+        }
+    };
     match dispatch(&cli) {
         Ok(Completion::Done) => ExitCode::SUCCESS,
         Ok(Completion::WithLoss) => ExitCode::from(3),

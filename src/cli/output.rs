@@ -4,11 +4,11 @@ use super::arguments::Global;
 use super::usage::Usage;
 use anyhow::{Context, anyhow, bail, ensure};
 use serde_json::Value;
-use std::borrow::Cow;
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Write};
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use zsim_base::printable::{printable, printable_json};
 
 /// Maximum number that is appended to a name.
 const MAX_NUMBER: u32 = 10_000;
@@ -209,7 +209,7 @@ pub(super) fn print_result(global: &Global, text: &str, mut json: Value, out: Op
         if let (Some(out), Some(object)) = (out, json.as_object_mut()) {
             object.insert("out".to_owned(), Value::String(out));
         }
-        return write_to_stdout(&escaped(&(serde_json::to_string_pretty(&json)? + "\n"), in_json));
+        return write_to_stdout(&printable_json(&(serde_json::to_string_pretty(&json)? + "\n")));
     }
     let text = if text.is_empty() { String::new() } else { format!("{}\n", text.trim_end()) };
     print(&(text + &out.map(|out| out + "\n").unwrap_or_default()))
@@ -227,37 +227,6 @@ pub(super) fn write_to_stdout(text: &str) -> anyhow::Result<()> {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("stdout cannot be written"),
         _ => Ok(()),
     }
-}
-
-/// Escapes control characters and characters that reorder text, except line ends and tabs.
-///
-/// Names from files could otherwise move the cursor or set the window title of the terminal.
-pub(super) fn printable(text: &str) -> Cow<'_, str> {
-    escaped(text, |c| c.escape_default().to_string())
-}
-
-/// The JSON escape of a character of the basic multilingual plane (RFC 8259, section 7).
-fn in_json(c: char) -> String {
-    format!("\\u{:04x}", u32::from(c))
-}
-
-fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
-    if text.chars().all(is_harmless) {
-        return Cow::Borrowed(text);
-    }
-    Cow::Owned(text.chars().map(|c| if is_harmless(c) { c.to_string() } else { escape(c) }).collect())
-}
-
-/// As [`printable`], with line ends escaped too, for a name within a line or a table.
-pub(super) fn printable_name(name: &str) -> String {
-    printable(name).replace('\n', "\\n")
-}
-
-/// Whether a character needs no escape: a line end, a tab, or neither a control character nor one that changes the
-/// direction of the text (Unicode Standard Annex 9).
-fn is_harmless(c: char) -> bool {
-    ['\n', '\t'].contains(&c)
-        || !c.is_control() && !matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]

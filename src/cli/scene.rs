@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, spec_file};
 use super::usage::Usage;
-use super::{Completion, output, quantity};
+use super::{Completion, message, output, quantity};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -78,7 +78,7 @@ impl Files {
         let inputs: Vec<PathBuf> =
             world.mesh_files().iter().cloned().chain(spec_file(Kind::Scene, &self.scene)).collect();
         output::check_not_inputs(&inputs, std::slice::from_ref(&self.file))?;
-        world.notes().iter().for_each(|note| eprintln!("note: {note}"));
+        world.notes().iter().for_each(|note| message::note(note));
         Ok((world, output::file(&self.file, self.force)?))
     }
 }

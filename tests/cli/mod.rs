@@ -11,6 +11,7 @@ mod hosts;
 mod live;
 mod live_run;
 mod maps;
+mod output;
 mod ros2;
 mod scene;
 mod sensor_models;

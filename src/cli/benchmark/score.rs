@@ -4,11 +4,12 @@ use super::scores::{Score, System, failures, figures, page, runs_csv, systems_ta
 use super::suite::Suite;
 use crate::arguments::Global;
 use crate::usage::Usage;
-use crate::{Completion, output, trajectory_file};
+use crate::{Completion, message, output, trajectory_file};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use zsim_base::geometry::Trajectory;
+use zsim_base::printable::{printable, printable_name};
 use zsim_evaluation::{Pairs, TrajectoryErrors};
 use zsim_study::replace_text;
 
@@ -83,8 +84,8 @@ fn note_unused(system: &str, folder: &Path, suite: &Suite) -> anyhow::Result<()>
         names.filter(|name| name.extension().is_some_and(|ending| ending == "tum") && !of_recording(name)).collect();
     unused.sort();
     for name in unused {
-        let name = output::printable_name(&name.display().to_string());
-        eprintln!("note: {system}: {name} has the name of no recording and is not used");
+        let name = printable_name(&name.display().to_string());
+        message::note(&format!("{system}: {name} has the name of no recording and is not used"));
     }
     Ok(())
 }
@@ -99,7 +100,7 @@ fn score(path: &Path, truth: &Trajectory, min_coverage: f64) -> Score {
         Ok(TrajectoryErrors::of(&pairs, truth)?.0)
     });
     match errors {
-        Err(error) => Score { errors: None, failure: Some(output::printable(&format!("{error:#}")).into_owned()) },
+        Err(error) => Score { errors: None, failure: Some(printable(&format!("{error:#}")).into_owned()) },
         Ok(errors) => {
             let is_short = errors.coverage < min_coverage;
             let failure = is_short.then(|| format!("covers {:.1} %", 100.0 * errors.coverage));

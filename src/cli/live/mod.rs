@@ -20,13 +20,14 @@ pub(super) use self::frame::verdict;
 use self::queue::Queue;
 use self::run::LiveRun;
 use self::shared::Shared;
-use super::output::printable;
+use super::message;
 use anyhow::Context;
 use clap::Args;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use zsim_base::printable::printable;
 use zsim_report::page::{LiveEnd, LivePage, LiveVerdict};
 use zsim_study::{EstimateResult, StudyError, StudyEvent};
 
@@ -53,7 +54,7 @@ impl LiveArguments {
         let shared = Arc::new(Shared::new(page.html()?, LiveRun::new(page.volume)));
         let address = server::start(port, shared.clone())
             .with_context(|| format!("--live {port}: the port cannot be opened on 127.0.0.1"))?;
-        eprintln!("live: http://{address}/");
+        message::line(&format!("live: http://{address}/"));
         Live::new(shared).map(Some)
     }
 }
