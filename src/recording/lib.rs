@@ -18,7 +18,7 @@
 //!
 //! Stamps are from the sensors' own clocks (poses: the lidar's). The log time of a message is its arrival in true time.
 //!
-//! [`TumWriter`] and [`read_tum`] handle trajectories, [`PlyWriter`], [`PlyReader`] and [`LasWriter`] point clouds,
+//! [`TumWriter`] and [`read_tum`] handle trajectories ([`TrajectoryFile`] also in the formats of EuRoC and KITTI), [`PlyWriter`], [`PlyReader`] and [`LasWriter`] point clouds,
 //! [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`write_result`] writes an estimate as a recording for
 //! viewers, [`write_rosbag2_metadata`] the metadata of a folder of rosbag2.
 //!
@@ -55,7 +55,9 @@ mod schema;
 mod selection;
 mod stamp_screen;
 mod stamp_sorter;
+mod text_lines;
 mod topics;
+mod trajectory_file;
 mod truth;
 mod tum;
 mod wire;
@@ -82,6 +84,7 @@ pub use received::ReceivedWriter;
 pub use result::write_result;
 pub use rosbag2::write_rosbag2_metadata;
 pub use selection::{Selection, TopicPreference};
+pub use trajectory_file::{PoseTimes, TrajectoryFile};
 pub use truth::{Truth, TruthReader};
 pub use tum::{TumWriter, parse_tum, read_tum, write_tum};
 pub use writer::{BaseImuDescription, RunDescription, Writer};

@@ -1,18 +1,17 @@
 //! Trajectories in the text format of the TUM RGB-D benchmark: `t x y z qx qy qz qw` per line, in s and m.
 
-mod number;
+pub(crate) mod number;
 
 use crate::RecordingError;
+use crate::text_lines::for_each_line;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Read, Write};
+use std::io::{BufWriter, Read, Write};
 use std::path::Path;
+use zsim_base::files;
 use zsim_base::geometry::{Pose, Rotation, Trajectory, Vector};
 use zsim_base::measurement::SinkError;
 use zsim_base::time::Stamp;
 use zsim_truth::{ClockTruth, TruthSample, TruthSink};
-
-/// Maximum length of a line, bytes; a pose has about 100.
-const MAX_LINE_BYTES: u64 = 4096;
 
 /// Maximum deviation of a quaternion's norm from 1: files with few decimals come close to it.
 const NORM_TOLERANCE: f64 = 1e-2;
@@ -29,7 +28,7 @@ impl TumWriter<BufWriter<File>> {
     /// # Errors
     /// When it cannot be created.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        let file = files::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Ok(Self::new(BufWriter::new(file)))
     }
 }
@@ -91,7 +90,7 @@ pub fn write_tum(path: &Path, trajectory: &Trajectory) -> Result<(), RecordingEr
 /// # Errors
 /// When it cannot be read; with the line number if a line is not a pose or not later than the previous one.
 pub fn read_tum(path: &Path) -> Result<Trajectory, RecordingError> {
-    let file = File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+    let file = files::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
     parse_tum(&path.display().to_string(), file)
 }
 
@@ -102,50 +101,67 @@ pub fn read_tum(path: &Path) -> Result<Trajectory, RecordingError> {
 /// # Errors
 /// As [`read_tum`].
 pub fn parse_tum(name: &str, text: impl Read) -> Result<Trajectory, RecordingError> {
-    let mut text = BufReader::new(text);
     let mut trajectory = Trajectory::new();
-    let mut bytes = Vec::new();
-    for line in 1.. {
-        bytes.clear();
-        let read = (&mut text).take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes).map_err(RecordingError::Read)?;
-        if read == 0 {
-            break;
-        }
-        let error = |problem: String| RecordingError::Line { name: name.to_owned(), line, problem };
-        let is_complete = read < MAX_LINE_BYTES as usize;
-        let is_first = line == 1;
-        let line = std::str::from_utf8(&bytes).ok().filter(|_| is_complete).map(str::trim);
-        // Some editors write a byte order mark at the start.
-        let line = line.map(|line| if is_first { line.trim_start_matches('\u{feff}').trim() } else { line });
-        let line = line.ok_or_else(|| error("this is not a line of text of at most 4096 bytes".to_owned()))?;
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let (stamp, pose) = parse_line(line).map_err(error)?;
-        trajectory.push(stamp, pose).map_err(|problem| error(problem.to_string()))?;
-    }
+    for_each_line(name, text, |line| {
+        let Row { stamp, position, rotation } = parse_row(line)?;
+        let words = line.split_whitespace().count();
+        let rotation = rotation.ok_or_else(|| match words {
+            WORDS_OF_POSITION => format!("a pose needs {POSE}, but the line has {words}"),
+            _ => "the quaternion's norm is 0.0000, not 1".to_owned(),
+        })?;
+        trajectory.push(stamp, Pose::from_parts(position.into(), rotation)).map_err(|problem| problem.to_string())
+    })?;
     Ok(trajectory)
 }
 
-fn parse_line(line: &str) -> Result<(Stamp, Pose), String> {
+/// The numbers of a pose, for messages.
+const POSE: &str = "8 numbers, `t x y z qx qy qz qw`";
+/// Number of words of a line without attitude.
+const WORDS_OF_POSITION: usize = 4;
+
+/// A line of a trajectory.
+pub(crate) struct Row {
+    pub stamp: Stamp,
+    pub position: Vector,
+    /// `None` for a line without attitude, or with a quaternion of zeros.
+    pub rotation: Option<Rotation>,
+}
+
+/// Parses `t x y z qx qy qz qw` or `t x y z`.
+pub(crate) fn parse_row(line: &str) -> Result<Row, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [stamp, rest @ ..] = words.as_slice() else { return Err("the line is empty".to_owned()) };
-    if rest.len() != 7 {
-        return Err(format!("a pose needs 8 numbers, `t x y z qx qy qz qw`, but the line has {}", words.len()));
+    if ![3, 7].contains(&rest.len()) {
+        return Err(format!("a pose needs {POSE}, but the line has {}", words.len()));
     }
     let stamp = number::parse_stamp(stamp).ok_or_else(|| format!("`{stamp}` is not a time in seconds"))?;
-    let mut numbers = [0.0; 7];
-    for (number, word) in numbers.iter_mut().zip(rest) {
+    let (position, quaternion) = rest.split_at(3);
+    let position = numbers::<3>(position)?.into();
+    let rotation = if quaternion.is_empty() { None } else { rotation(numbers::<4>(quaternion)?)? };
+    Ok(Row { stamp, position, rotation })
+}
+
+/// Parses finite numbers, one for each word.
+pub(crate) fn numbers<const N: usize>(words: &[&str]) -> Result<[f64; N], String> {
+    let mut numbers = [0.0; N];
+    for (number, word) in numbers.iter_mut().zip(words) {
         *number =
             word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| format!("`{word}` is not a number"))?;
     }
-    let [x, y, z, qx, qy, qz, qw] = numbers;
-    let quaternion = nalgebra::Quaternion::new(qw, qx, qy, qz);
+    Ok(numbers)
+}
+
+/// The rotation of the quaternion `x, y, z, w`; `None` for zeros, which files without attitudes have.
+pub(crate) fn rotation([x, y, z, w]: [f64; 4]) -> Result<Option<Rotation>, String> {
+    let quaternion = nalgebra::Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
+    if norm == 0.0 {
+        return Ok(None);
+    }
     if (norm - 1.0).abs() > NORM_TOLERANCE {
         return Err(format!("the quaternion's norm is {norm:.4}, not 1"));
     }
-    Ok((stamp, Pose::from_parts(Vector::new(x, y, z).into(), Rotation::from_quaternion(quaternion))))
+    Ok(Some(Rotation::from_quaternion(quaternion)))
 }
 
 #[cfg(test)]
