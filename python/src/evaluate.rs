@@ -53,10 +53,11 @@ impl Evaluation {
 
     fn __repr__(&self) -> String {
         let errors = &self.errors;
+        let rotation_rmse_rad = errors.rotation_rmse_rad.unwrap_or(f64::NAN);
         format!(
             "<zsim.Evaluation: position RMSE {:.2} mm, rotation RMSE {:.3} deg, {:.1} % of the truth>",
             1e3 * errors.position_rmse_m,
-            errors.rotation_rmse_rad.to_degrees(),
+            rotation_rmse_rad.to_degrees(),
             100.0 * errors.coverage
         )
     }

@@ -2,23 +2,27 @@
 
 use super::arguments::{Global, OutArguments};
 use super::limit::{Limit, fraction};
-use super::{Completion, message, output, trajectory_file};
+use super::trajectory_file::{self, Truth, TruthTimes};
+use super::{Completion, message, output};
 use anyhow::{Context, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim_base::geometry::Trajectory;
 use zsim_base::printable::printable_name;
-use zsim_evaluation::{Errors, Pairs, TrajectoryErrors};
+use zsim_evaluation::{Errors, TrajectoryErrors};
 use zsim_study::replace_text;
+
+/// Files of --out.
+const FILES: [&str; 5] = ["comparison.json", "errors.svg", "errors.png", "trajectories.svg", "trajectories.png"];
 
 /// Coverage below which a limit of the errors says little, for a note.
 const LOW_COVERAGE: f64 = 0.95;
 
 /// Compare estimated trajectories with the true one, and fail above a limit
 ///
-/// Trajectories are TUM files with stamps of the same clock. Each estimate is aligned with the truth (rigid, by
-/// positions, as evo_ape -a). The table has the time covered, the absolute error of the position (APE: RMSE and maximum)
+/// Estimates are TUM files with stamps of the clock of the truth. The denser of two trajectories is interpolated at the stamps
+/// of the sparser one. Each estimate is aligned with the truth (rigid, by positions, as evo_ape -a). The table has the time covered, the absolute error of the position (APE: RMSE and maximum)
 /// and of the rotation (RMSE), the relative error of the position over 1 m of path and 1 s (RPE: RMSE), and the drift. --out
 /// writes comparison.json and the plots errors and trajectories.
 ///
@@ -32,9 +36,11 @@ pub(super) struct Arguments {
     /// The estimated trajectories
     #[arg(value_name = "A.tum", required = true)]
     estimates: Vec<PathBuf>,
-    /// The true trajectory, or a recording with the ground truth
-    #[arg(long, value_name = "T.tum|T.mcap")]
+    /// The true trajectory (TUM, EuRoC or KITTI; `t x y z` for positions only), or a recording with the ground truth
+    #[arg(long, value_name = "T.tum|T.csv|T.mcap")]
     truth: PathBuf,
+    #[command(flatten)]
+    times: TruthTimes,
     /// Fail if a figure of an estimate is above this limit; can be repeated. The names are those of --json without the
     /// unit: position_rmse=5mm, rotation_rmse=0.1deg, drift=2cm/min, relative_error_per_metre=1cm
     #[arg(long, value_name = "NAME=LIMIT", value_parser = Limit::parse)]
@@ -59,9 +65,9 @@ struct Compared {
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
-    let truth = trajectory_file::truth(&arguments.truth)?;
+    let truth = Truth::read(&arguments.truth, &arguments.times)?;
     let compare = |path: &PathBuf| {
-        compare(path, &truth)
+        compare(path, &truth, global.quiet)
             .with_context(|| format!("{} cannot be compared with {}", path.display(), arguments.truth.display()))
     };
     let mut compared = arguments.estimates.iter().map(compare).collect::<anyhow::Result<Vec<_>>>()?;
@@ -71,11 +77,16 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let out = &arguments.out;
     let folder = out.out.as_ref().map(|wanted| output::folder(wanted, out.force)).transpose()?;
     if let Some(folder) = &folder {
-        write(folder, &truth, &compared, &figures)?;
+        let inputs: Vec<PathBuf> = arguments.estimates.iter().chain([&arguments.truth]).cloned().collect();
+        output::check_not_inputs(&inputs, &FILES.map(|name| folder.join(name)))?;
+        write(folder, &truth.trajectory, &compared, &figures)?;
     }
     output::print_result(global, &text(&compared, global.verbose), figures, folder.as_deref())?;
     if !violations.is_empty() {
         bail!("a limit is exceeded: {}", violations.join("; "));
+    }
+    if !global.quiet {
+        truth.note(&arguments.truth);
     }
     let partial = compared.iter().find(|each| each.errors.coverage < LOW_COVERAGE);
     let is_unlimited = !arguments.fail_above.is_empty() && arguments.min_coverage.is_none();
@@ -86,10 +97,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     Ok(Completion::Done)
 }
 
-fn compare(path: &Path, truth: &Trajectory) -> anyhow::Result<Compared> {
+fn compare(path: &Path, truth: &Truth, is_quiet: bool) -> anyhow::Result<Compared> {
     let estimate = trajectory_file::estimate(path)?;
-    let pairs = Pairs::associate(&estimate, truth)?;
-    let (errors, over_time) = TrajectoryErrors::of(&pairs, truth)?;
+    let pairs = truth.pairs(&estimate)?;
+    if !is_quiet {
+        trajectory_file::note_interpolation(path, &pairs);
+    }
+    let (errors, over_time) = TrajectoryErrors::of(&pairs, &truth.trajectory)?;
     let aligned = estimate.transformed(&pairs.world_from_map()?);
     let name = path.display().to_string();
     Ok(Compared { label: name.clone(), name, errors, over_time, aligned })

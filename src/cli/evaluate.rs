@@ -1,13 +1,14 @@
 //! `zsim evaluate`: errors of a trajectory and of a cloud.
 
 use super::arguments::Global;
-use super::{Completion, output, trajectory_file};
+use super::trajectory_file::{self, Truth, TruthTimes};
+use super::{Completion, output};
 use anyhow::Context;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use zsim_base::geometry::{Pose, SmoothCursor, Trajectory, Vector};
-use zsim_evaluation::{CloudErrors, Pairs, Thinning, TrajectoryErrors};
+use zsim_evaluation::{CloudErrors, Thinning, TrajectoryErrors};
 use zsim_recording::PlyReader;
 use zsim_world::World;
 
@@ -18,9 +19,8 @@ const REACH_M: f64 = 1.0;
 
 /// Evaluate a trajectory against the true trajectory, and a cloud against the true surfaces
 ///
-/// Trajectories are TUM files (`t x y z qx qy qz qw`) with stamps of the same clock; the true one can also be the
-/// recording of `zsim simulate`. The estimate is aligned with the
-/// truth (rigid, by positions, as evo_ape -a). The same alignment is applied to a cloud in the map frame of the
+/// The estimate is a TUM file (`t x y z qx qy qz qw`) with stamps of the clock of the truth. The denser of both is interpolated
+/// at the stamps of the sparser one. The estimate is aligned with the truth (rigid, by positions, as evo_ape -a). The same alignment is applied to a cloud in the map frame of the
 /// estimate; without trajectories, the cloud is in the world frame.
 #[derive(Args)]
 #[command(
@@ -32,9 +32,11 @@ pub(super) struct Arguments {
     /// The estimated trajectory
     #[arg(long, value_name = "A.tum", requires = "truth")]
     estimate: Option<PathBuf>,
-    /// The true trajectory, or a recording with the ground truth
-    #[arg(long, value_name = "B.tum|FILE.mcap", requires = "estimate")]
+    /// The true trajectory (TUM, EuRoC or KITTI; `t x y z` for positions only), or a recording with the ground truth
+    #[arg(long, value_name = "B.tum|B.csv|FILE.mcap", requires = "estimate")]
     truth: Option<PathBuf>,
+    #[command(flatten)]
+    times: TruthTimes,
     /// The cloud
     #[arg(long, value_name = "C.ply", requires = "scene")]
     cloud: Option<PathBuf>,
@@ -48,9 +50,13 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let mut estimated = None;
     if let (Some(estimated_path), Some(truth)) = (&arguments.estimate, &arguments.truth) {
         let estimate = trajectory_file::estimate(estimated_path)?;
-        let known = trajectory_file::truth(truth)?;
-        let pairs = Pairs::associate(&estimate, &known)?;
-        let (errors, _) = TrajectoryErrors::of(&pairs, &known)?;
+        let known = Truth::read(truth, &arguments.times)?;
+        let pairs = known.pairs(&estimate)?;
+        let (errors, _) = TrajectoryErrors::of(&pairs, &known.trajectory)?;
+        if !global.quiet {
+            known.note(truth);
+            trajectory_file::note_interpolation(estimated_path, &pairs);
+        }
         metrics = zsim_report::trajectory_figures(&errors);
         estimated = Some((estimate, pairs.world_from_map()?));
     }
@@ -94,11 +100,11 @@ fn evaluate_cloud(
 }
 
 fn text(metrics: &Map<String, Value>) -> String {
-    let known = metrics.iter().filter(|(_, value)| !value.is_null());
     let value = |value: &Value| match value.as_f64() {
         Some(number) if value.is_f64() => format!("{number:.6}"),
+        None if value.is_null() => "-".to_owned(),
         _ => value.to_string(),
     };
-    let rows: Vec<Vec<String>> = known.map(|(key, metric)| vec![key.clone(), value(metric)]).collect();
+    let rows: Vec<Vec<String>> = metrics.iter().map(|(key, metric)| vec![key.clone(), value(metric)]).collect();
     zsim_report::table(&[], &rows, true)
 }

@@ -94,7 +94,9 @@ impl Limit {
     pub fn violation(&self, name: &str, figures: &Map<String, Value>) -> Option<String> {
         let Some(found) = figures.get(&self.key).and_then(Value::as_f64) else {
             let (key, text) = (&self.key, &self.text);
-            return Some(format!("{name}: {key} is not known, because the trajectory is too short (limit {text})"));
+            return Some(format!(
+                "{name}: {key} is not known: the trajectory is too short, or the truth has no attitudes (limit {text})"
+            ));
         };
         let within = found <= self.value;
         (!within).then(|| format!("{name}: {} is {found:.6} (limit {})", self.key, self.text))

@@ -9,7 +9,8 @@ pub struct Errors {
     pub stamps: Vec<Stamp>,
     /// Estimated minus true position, m.
     pub position_m: Vec<Vector>,
-    /// Rotation vector that takes the true attitude to the estimated one, `log(R_est R_true^T)`, rad.
+    /// Rotation vector that takes the true attitude to the estimated one, `log(R_est R_true^T)`, rad; empty without true
+    /// attitudes.
     pub rotation_rad: Vec<Vector>,
 }
 
@@ -21,7 +22,9 @@ impl Errors {
         for (map_from_head, world_from_head) in pairs.estimate().iter().zip(pairs.truth()) {
             let estimated = world_from_map * map_from_head;
             errors.position_m.push(estimated.translation.vector - world_from_head.translation.vector);
-            errors.rotation_rad.push((estimated.rotation * world_from_head.rotation.inverse()).scaled_axis());
+            if !pairs.have_positions_only() {
+                errors.rotation_rad.push((estimated.rotation * world_from_head.rotation.inverse()).scaled_axis());
+            }
         }
         errors
     }

@@ -15,8 +15,8 @@ const SECONDS_PER_MINUTE: f64 = 60.0;
 pub struct Drift {
     /// Growth of the distance to the true position, m/min.
     pub position_m_per_min: f64,
-    /// Growth of the error about the vertical, absolute, rad/min.
-    pub yaw_rad_per_min: f64,
+    /// Growth of the error about the vertical, absolute, rad/min; `None` without true attitudes.
+    pub yaw_rad_per_min: Option<f64>,
     /// Distance to the true position at the end, with the start aligned, m.
     pub end_error_m: f64,
 }
@@ -24,7 +24,8 @@ pub struct Drift {
 /// Drift of an estimate that is aligned over the first [`ALIGNMENT_S`] seconds only.
 ///
 /// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by
-/// attitudes where positions do not determine the rotation (twenty seconds of a straight path). The drift is the mean
+/// attitudes where positions do not determine the rotation (twenty seconds of a straight path); without true attitudes by
+/// positions only. The drift is the mean
 /// distance over the last [`TAIL_S`] seconds, divided by the minutes from the middle of the first
 /// interval (where a constant drift is aligned to zero) to the middle of the last; for the yaw, the mean error over the
 /// last interval minus that over the first. So a constant drift that a test adds is returned unchanged.
@@ -37,13 +38,17 @@ pub fn drift(pairs: &Pairs) -> Result<Drift, EvaluationError> {
         return Err(EvaluationError::TooShort { measure: "drift", needed_s, found_s });
     }
     let (start, tail) = (pairs.first_seconds(ALIGNMENT_S), pairs.last_seconds(TAIL_S));
-    let world_from_map = super::align_poses(start.truth(), start.estimate(), TURN_LEVER_M)?;
+    let world_from_map = match start.have_positions_only() {
+        true => start.world_from_map()?,
+        false => super::align_poses(start.truth(), start.estimate(), TURN_LEVER_M)?,
+    };
     let (at_start, at_end) = (Errors::after(&start, &world_from_map), Errors::after(&tail, &world_from_map));
     let origin = pairs.stamps()[0];
+    let yaw_rad = (!start.have_positions_only()).then(|| (at_end.mean_yaw_rad() - at_start.mean_yaw_rad()).abs());
     let minutes = (tail.mean_time_s(origin) - start.mean_time_s(origin)) / SECONDS_PER_MINUTE;
     Ok(Drift {
         position_m_per_min: at_end.mean_position_m() / minutes,
-        yaw_rad_per_min: (at_end.mean_yaw_rad() - at_start.mean_yaw_rad()).abs() / minutes,
+        yaw_rad_per_min: yaw_rad.map(|yaw_rad| yaw_rad / minutes),
         end_error_m: at_end.end_position_m().unwrap_or_default(),
     })
 }
@@ -75,7 +80,7 @@ mod tests {
         // of which the part that correlates with the path), so to a few per cent.
         let found = drift_of(|minutes| Pose::translation(0.0, 0.0, 0.06 * minutes));
         assert_relative_eq!(found.position_m_per_min, 0.06, max_relative = 0.05);
-        assert!(found.yaw_rad_per_min < 1e-4);
+        assert!(found.yaw_rad_per_min.unwrap() < 1e-4);
         // At the end 110 s have passed since the middle of the alignment.
         assert_relative_eq!(found.end_error_m, 0.06 * 110.0 / 60.0, max_relative = 0.05);
     }
@@ -89,7 +94,7 @@ mod tests {
         });
         let pairs = Pairs::associate(&Trajectory::from_poses(turned).unwrap(), &yawed).unwrap();
         let found = drift(&pairs).unwrap();
-        assert_relative_eq!(found.yaw_rad_per_min, 0.01, max_relative = 1e-6);
+        assert_relative_eq!(found.yaw_rad_per_min.unwrap(), 0.01, max_relative = 1e-6);
         // The head's turn over the first 20 s, 1/600 rad from its mean at most, turns the alignment by a hundredth of
         // that.
         assert!(found.position_m_per_min < 1e-4, "{found:?}");

@@ -2,7 +2,9 @@
 #[derive(Debug, Clone, thiserror::Error, PartialEq)]
 pub enum EvaluationError {
     /// No pose of the estimate is within the time of the truth.
-    #[error("the estimate ({estimate}) and the truth ({truth}) do not overlap in time; use one clock for both")]
+    #[error(
+        "the estimate ({estimate}) and the truth ({truth}) do not overlap in time, or only within a gap; use one clock for both"
+    )]
     NothingInCommon {
         /// The estimate's span, for people.
         estimate: String,

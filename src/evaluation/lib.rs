@@ -37,4 +37,4 @@ pub use error::EvaluationError;
 pub use pairs::{Pairs, PoseSampler};
 pub use reference_cloud::ReferenceCloud;
 pub use relative::{RelativeError, relative_error, relative_error_over_path};
-pub use trajectory_errors::TrajectoryErrors;
+pub use trajectory_errors::{TrajectoryErrors, gap_s};

@@ -8,21 +8,53 @@ pub struct Pairs {
     stamps: Vec<Stamp>,
     estimate: Vec<Pose>,
     truth: Vec<Pose>,
+    /// Whether the true rotations are not known.
+    positions_only: bool,
+    /// Median interval of the trajectory that was interpolated; `None` if all stamps are in both.
+    interpolated: Option<Span>,
 }
 
 impl Pairs {
-    /// The estimate's poses that lie within the truth's time, with the truth interpolated at their stamps.
+    /// Pairs the poses of the sparser trajectory with the denser one, interpolated at their stamps.
+    ///
+    /// Interpolation cuts the corners of a path, so that a sparse truth would seem to be an error of the estimate. The
+    /// sparser trajectory is that with the larger median interval in the common time. Nothing is interpolated over a gap of
+    /// more than [`MAX_INTERVALS`] of these intervals.
     ///
     /// # Errors
-    /// When no pose does.
+    /// When the trajectories have no time in common.
     pub fn associate(estimate: &Trajectory, truth: &Trajectory) -> Result<Self, EvaluationError> {
-        let mut sampler = PoseSampler::at(estimate.stamps());
-        truth.iter().for_each(|(stamp, pose)| sampler.add(stamp, *pose));
-        let pairs = Self::of(estimate, &sampler.finish());
+        // A trajectory with one pose in the common time is sparse.
+        let interval = |of| median_interval(stamps_within(of, estimate, truth)).map_or(i64::MAX, Span::nanos);
+        let (of_estimate, of_truth) = (interval(estimate), interval(truth));
+        let limit = Span::from_nanos(of_estimate.max(of_truth).saturating_mul(MAX_INTERVALS));
+        let is_truth_sparse = of_truth > of_estimate;
+        let (dense, sparse) = if is_truth_sparse { (estimate, truth) } else { (truth, estimate) };
+        let pairs = Self::of(sparse, &interpolated(dense, sparse.stamps(), limit));
         if pairs.is_empty() {
             return Err(EvaluationError::NothingInCommon { estimate: span_of(estimate), truth: span_of(truth) });
         }
-        Ok(pairs)
+        let is_known = |stamp| dense.stamps().binary_search(stamp).is_ok();
+        let interval = Span::from_nanos(of_estimate.min(of_truth));
+        let pairs = Self { interpolated: (!pairs.stamps.iter().all(is_known)).then_some(interval), ..pairs };
+        Ok(if is_truth_sparse { Self { estimate: pairs.truth, truth: pairs.estimate, ..pairs } } else { pairs })
+    }
+
+    /// Median interval of the trajectory that was interpolated linearly, by [`associate`](Self::associate); `None` if all
+    /// stamps are in both.
+    pub fn interpolated_over(&self) -> Option<Span> {
+        self.interpolated
+    }
+
+    /// The same pairs for a truth without attitudes: nothing that depends on the true rotation is evaluated.
+    #[must_use]
+    pub fn with_positions_only(self) -> Self {
+        Self { positions_only: true, ..self }
+    }
+
+    /// Whether the true rotations are not known.
+    pub fn have_positions_only(&self) -> bool {
+        self.positions_only
     }
 
     /// Pairs the estimate's poses with the true poses at the same stamps, as a [`PoseSampler`] returns them.
@@ -96,6 +128,8 @@ impl Pairs {
             stamps: self.stamps[from..to].to_vec(),
             estimate: self.estimate[from..to].to_vec(),
             truth: self.truth[from..to].to_vec(),
+            positions_only: self.positions_only,
+            interpolated: self.interpolated,
         }
     }
 
@@ -112,6 +146,36 @@ impl Pairs {
     pub(super) fn mean_time_s(&self, origin: Stamp) -> f64 {
         self.stamps.iter().map(|stamp| stamp.seconds_since(origin)).sum::<f64>() / self.len() as f64
     }
+}
+
+/// Maximum number of median intervals of the sparser trajectory over which the denser one is interpolated.
+const MAX_INTERVALS: i64 = 2;
+
+/// The stamps of a trajectory within the common time of two.
+fn stamps_within<'a>(of: &'a Trajectory, a: &Trajectory, b: &Trajectory) -> &'a [Stamp] {
+    let (Some(a), Some(b)) = (a.span(), b.span()) else { return &[] };
+    let (first, last) = (a.0.max(b.0), a.1.min(b.1));
+    let stamps = of.stamps();
+    let from = stamps.partition_point(|stamp| *stamp < first);
+    &stamps[from..stamps.partition_point(|stamp| *stamp <= last).max(from)]
+}
+
+/// The median interval between stamps; `None` with fewer than two.
+pub(super) fn median_interval(stamps: &[Stamp]) -> Option<Span> {
+    let mut intervals: Vec<Span> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = intervals.len() / 2;
+    (!intervals.is_empty()).then(|| *intervals.select_nth_unstable(middle).1)
+}
+
+/// The poses of a trajectory at stamps, without those in an interval of more than `limit`.
+fn interpolated(trajectory: &Trajectory, at: &[Stamp], limit: Span) -> Vec<(Stamp, Pose)> {
+    let known = trajectory.stamps();
+    let is_close = |stamp: &&Stamp| {
+        let after = known.partition_point(|known| known < *stamp);
+        let before = after.checked_sub(1).map(|before| known[before]);
+        known.get(after).is_some_and(|after| after == *stamp || before.is_some_and(|before| *after - before <= limit))
+    };
+    at.iter().filter(is_close).filter_map(|stamp| Some((*stamp, trajectory.at(*stamp)?))).collect()
 }
 
 /// Interpolates a trajectory at given stamps while it is read pose by pose, and never stored in full.
@@ -177,6 +241,44 @@ mod tests {
     }
 
     #[test]
+    fn the_denser_trajectory_is_interpolated_at_the_stamps_of_the_sparser_one() {
+        // On a circle of 1 m at 1 rad/s: a chord over 1 s is 1 - cos(0.5) = 122 mm inside the circle in its middle, one over
+        // 10 ms 0.0125 mm.
+        let circle = |from_ms: i64, step_ms: i64, count: i64| {
+            let pose = |k: i64| {
+                let ms = from_ms + step_ms * k;
+                let (y, x) = (1e-3 * ms as f64).sin_cos();
+                (Stamp::from_nanos(ms * 1_000_000), Pose::translation(x, y, 0.0))
+            };
+            Trajectory::from_poses((0..count).map(pose)).unwrap()
+        };
+        let (dense, sparse) = (circle(0, 10, 1000), circle(505, 1000, 9));
+        for (estimate, truth) in [(&dense, &sparse), (&sparse, &dense)] {
+            let pairs = Pairs::associate(estimate, truth).unwrap();
+            assert_eq!(pairs.stamps(), sparse.stamps());
+            let error = |(a, b): (&Pose, &Pose)| (a.translation.vector - b.translation.vector).norm();
+            let largest = pairs.estimate().iter().zip(pairs.truth()).map(error).fold(0.0, f64::max);
+            assert!(largest < 1.3e-5, "{largest}");
+            let is_on_circle = |pose: &Pose| (pose.translation.vector.norm() - 1.0).abs() < 1e-12;
+            let of_sparse = if std::ptr::eq(estimate, &raw const sparse) { pairs.estimate() } else { pairs.truth() };
+            assert!(of_sparse.iter().all(is_on_circle), "the sparser one is not interpolated");
+            assert_eq!(pairs.interpolated_over(), Some(Span::from_nanos(10_000_000)));
+        }
+    }
+
+    #[test]
+    fn nothing_is_interpolated_over_a_gap_of_the_denser_trajectory() {
+        // The estimate has 0 to 1 s and 5 to 6 s at 100 Hz; the truth has every quarter of a second.
+        let dense =
+            line(0, 101).iter().chain(line(5000, 101).iter()).map(|(stamp, pose)| (stamp, *pose)).collect::<Vec<_>>();
+        let quarter = |k: i64| (Stamp::from_nanos(250_000_000 * k + 1), Pose::translation(k as f64, 0.0, 0.0));
+        let truth = Trajectory::from_poses((0..24).map(quarter)).unwrap();
+        let pairs = Pairs::associate(&Trajectory::from_poses(dense).unwrap(), &truth).unwrap();
+        let quarters: Vec<i64> = pairs.stamps().iter().map(|stamp| stamp.nanos() / 250_000_000).collect();
+        assert_eq!(quarters, [0, 1, 2, 3, 20, 21, 22, 23]);
+    }
+
+    #[test]
     fn poses_with_gaps_in_the_truth_are_paired_by_stamp() {
         // The truth has the stamps 10, 30 and 45 ms; the estimate 0, 10, ..., 90 ms with x = t / 10 ms.
         let at = |ms: i64| (Stamp::from_nanos(ms * 1_000_000), Pose::translation(0.0, ms as f64, 0.0));
@@ -196,6 +298,7 @@ mod tests {
     fn the_first_and_last_seconds_include_their_ends() {
         let pairs = Pairs::associate(&line(0, 101), &line(0, 101)).unwrap();
         assert_eq!((pairs.first_seconds(0.2).len(), pairs.last_seconds(0.2).len()), (21, 21));
+        assert_eq!(pairs.interpolated_over(), None);
         assert!((pairs.duration_s() - 1.0).abs() < 1e-12);
     }
 }

@@ -1,6 +1,7 @@
 use super::{Drift, Errors, EvaluationError, Pairs, RelativeError, drift, relative_error, relative_error_over_path};
+use crate::pairs::median_interval;
 use zsim_base::geometry::{Trajectory, Vector};
-use zsim_base::time::Span;
+use zsim_base::time::{Span, Stamp};
 
 /// The errors of a trajectory: absolute, relative, and drift.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,7 +10,7 @@ pub struct TrajectoryErrors {
     pub poses: usize,
     /// Time from the first of these poses to the last, s.
     pub duration_s: f64,
-    /// Fraction of the truth's time that these poses cover; gaps of more than 1 s are not covered.
+    /// Fraction of the truth's time that these poses cover; gaps ([`gap_s`]) are not covered.
     pub coverage: f64,
     /// Root mean square of the position error after alignment, m: the `rmse` of `evo_ape -a`.
     pub position_rmse_m: f64,
@@ -17,11 +18,12 @@ pub struct TrajectoryErrors {
     pub position_median_m: f64,
     /// Maximum of the position error, m.
     pub position_max_m: f64,
-    /// Root mean square of the rotation error after the same alignment, rad.
-    pub rotation_rmse_rad: f64,
-    /// Maximum of the rotation error, rad.
-    pub rotation_max_rad: f64,
-    /// Relative error over 1 m of the true path; `None` if the path is too short.
+    /// Root mean square of the rotation error after the same alignment, rad; `None` without true attitudes.
+    pub rotation_rmse_rad: Option<f64>,
+    /// Maximum of the rotation error, rad; `None` without true attitudes.
+    pub rotation_max_rad: Option<f64>,
+    /// Relative error over 1 m of the true path; `None` if the path is too short, or without true attitudes, in whose axes
+    /// motions are compared.
     pub per_metre: Option<RelativeError>,
     /// Relative error over 1 s.
     pub per_second: Option<RelativeError>,
@@ -32,9 +34,6 @@ pub struct TrajectoryErrors {
 }
 
 impl TrajectoryErrors {
-    /// Interval between poses above which the trajectory has a gap, s.
-    pub const MAX_INTERVAL_S: f64 = 1.0;
-
     /// Computes the errors of `pairs`, and the absolute errors over time after a rigid alignment by the positions.
     ///
     /// `truth` is the complete true trajectory, for the coverage.
@@ -44,7 +43,8 @@ impl TrajectoryErrors {
     pub fn of(pairs: &Pairs, truth: &Trajectory) -> Result<(Self, Errors), EvaluationError> {
         let errors = Errors::after(pairs, &pairs.world_from_map()?);
         let (position_m, rotation_rad) = (sorted_norms(&errors.position_m), sorted_norms(&errors.rotation_rad));
-        let per_time = |seconds: f64| relative_error(pairs, Span::from_seconds(seconds)).ok();
+        let has_attitudes = !pairs.have_positions_only();
+        let per_time = |seconds: f64| relative_error(pairs, Span::from_seconds(seconds)).ok().filter(|_| has_attitudes);
         let largest = |sorted: &[f64]| sorted.last().copied().unwrap_or_default();
         let found = Self {
             poses: pairs.len(),
@@ -53,14 +53,14 @@ impl TrajectoryErrors {
             position_rmse_m: errors.position_rmse_m(),
             position_median_m: median(&position_m),
             position_max_m: largest(&position_m),
-            rotation_rmse_rad: errors.rotation_rmse_rad(),
-            rotation_max_rad: largest(&rotation_rad),
-            per_metre: relative_error_over_path(pairs, 1.0).ok(),
+            rotation_rmse_rad: has_attitudes.then(|| errors.rotation_rmse_rad()),
+            rotation_max_rad: has_attitudes.then(|| largest(&rotation_rad)),
+            per_metre: relative_error_over_path(pairs, 1.0).ok().filter(|_| has_attitudes),
             per_second: per_time(1.0),
             per_minute: per_time(60.0),
             drift: drift(pairs).ok(),
         };
-        if !(found.position_rmse_m.is_finite() && found.rotation_rmse_rad.is_finite()) {
+        if !(found.position_rmse_m.is_finite() && found.rotation_rmse_rad.is_none_or(f64::is_finite)) {
             return Err(EvaluationError::NotFinite);
         }
         Ok((found, errors))
@@ -81,10 +81,17 @@ fn median(sorted: &[f64]) -> f64 {
     }
 }
 
+/// Interval between poses above which the trajectory has a gap, s: 1 s, or two median intervals of the sparser of the two
+/// trajectories that are compared, whose stamps these are.
+pub fn gap_s(stamps: &[Stamp]) -> f64 {
+    median_interval(stamps).map_or(0.0, |interval| 2.0 * interval.seconds()).max(1.0)
+}
+
 fn coverage(pairs: &Pairs, truth: &Trajectory) -> f64 {
     let truth_s = truth.span().map_or(0.0, |(first, last)| last.seconds_since(first));
     let intervals = pairs.stamps().windows(2).map(|pair| pair[1].seconds_since(pair[0]));
-    let covered_s: f64 = intervals.filter(|interval_s| *interval_s <= TrajectoryErrors::MAX_INTERVAL_S).sum();
+    let gap_s = gap_s(truth.stamps());
+    let covered_s: f64 = intervals.filter(|interval_s| *interval_s <= gap_s).sum();
     // The sum of the intervals can exceed the time by rounding.
     if truth_s > 0.0 { (covered_s / truth_s).min(1.0) } else { 0.0 }
 }

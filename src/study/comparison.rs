@@ -102,7 +102,7 @@ pub(super) fn open_loop_metrics(
         position_rmse_m: errors.map(|errors| errors.position_rmse_m),
         rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
         drift_m_per_min: drift.map(|drift| drift.position_m_per_min),
-        yaw_drift_deg_per_min: drift.map(|drift| drift.yaw_rad_per_min.to_degrees()),
+        yaw_drift_deg_per_min: drift.and_then(|drift| drift.yaw_rad_per_min).map(f64::to_degrees),
         end_error_m: drift.map(|drift| drift.end_error_m),
         relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
         imu_only_drift_m_per_min: dead_reckoning.map(|drift| drift.0),

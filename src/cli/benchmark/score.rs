@@ -3,14 +3,14 @@
 use super::scores::{Score, System, failures, figures, page, runs_csv, systems_table};
 use super::suite::Suite;
 use crate::arguments::Global;
+use crate::trajectory_file::{self, Truth, TruthTimes};
 use crate::usage::Usage;
-use crate::{Completion, message, output, trajectory_file};
+use crate::{Completion, message, output};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use zsim_base::geometry::Trajectory;
 use zsim_base::printable::{printable, printable_name};
-use zsim_evaluation::{Pairs, TrajectoryErrors};
+use zsim_evaluation::TrajectoryErrors;
 use zsim_study::replace_text;
 
 /// Compare the trajectories of one or more systems with the truth of a suite
@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         systems.push(System { name: name.clone(), scores: Vec::new() });
     }
     for item in &suite.recordings {
-        let truth = trajectory_file::truth(&arguments.folder.join(&item.truth))?;
+        let truth = Truth::read(&arguments.folder.join(&item.truth), &TruthTimes::default())?;
         for (system, (_, folder)) in systems.iter_mut().zip(&arguments.system) {
             let path = folder.join(format!("{}.tum", item.name));
             system.scores.push(score(&path, &truth, arguments.min_coverage));
@@ -91,13 +91,13 @@ fn note_unused(system: &str, folder: &Path, suite: &Suite) -> anyhow::Result<()>
 }
 
 /// The errors of the trajectory in the file `path`, or why there are none.
-fn score(path: &Path, truth: &Trajectory, min_coverage: f64) -> Score {
+fn score(path: &Path, truth: &Truth, min_coverage: f64) -> Score {
     if !path.is_file() {
         return Score { errors: None, failure: Some("no trajectory".to_owned()) };
     }
     let errors = trajectory_file::estimate(path).and_then(|estimate| {
-        let pairs = Pairs::associate(&estimate, truth)?;
-        Ok(TrajectoryErrors::of(&pairs, truth)?.0)
+        let pairs = truth.pairs(&estimate)?;
+        Ok(TrajectoryErrors::of(&pairs, &truth.trajectory)?.0)
     });
     match errors {
         Err(error) => Score { errors: None, failure: Some(printable(&format!("{error:#}")).into_owned()) },
