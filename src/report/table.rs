@@ -7,10 +7,14 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle
 /// Row names that are narrower are not worth whole numbers.
 const MIN_NAME_WIDTH: usize = 12;
 
+/// Maximum length of a cell, characters: a longer one is cut. The time of the layout grows with the square of the length.
+const MAX_CELL: usize = 200;
+
 /// Formats a table for the terminal, without rules between rows.
 ///
-/// The first column is text; with `numbers`, the other columns are right-aligned.
+/// The first column is text; with `numbers`, the other columns are right-aligned. Cells of more than 200 characters are cut.
 pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
+    let rows: &[Vec<String>] = &rows.iter().map(|row| row.iter().map(|cell| cut(cell)).collect()).collect::<Vec<_>>();
     let mut table = Table::new();
     let rule = LineStyle::none().left('\u{2500}').fill('\u{2500}').junction('\u{2500}').right('\u{2500}');
     table.load_style(TableStyle::new().header_separator(rule));
@@ -27,7 +31,7 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     table.column_iter_mut().for_each(|column| {
         column.set_padding(padding);
     });
-    keep_whole(&mut table, rows, numbers, padding.0 + padding.1);
+    keep_whole(&mut table, header, rows, numbers, padding.0 + padding.1);
     if numbers {
         table.column_iter_mut().skip(1).for_each(|column| {
             column.set_cell_alignment(CellAlignment::Right);
@@ -37,12 +41,24 @@ pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     text.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
 }
 
-/// Keeps names and `numbers` on one line as far as the width permits: a broken number would be read as two.
-fn keep_whole(table: &mut Table, rows: &[Vec<String>], numbers: bool, padding: u16) {
+/// The start of a cell that is too long, with an ellipsis.
+fn cut(cell: &str) -> String {
+    let end = cell.char_indices().nth(MAX_CELL).map_or(cell.len(), |(index, _)| index);
+    if end == cell.len() { cell.to_owned() } else { format!("{}\u{2026}", &cell[..end]) }
+}
+
+/// Keeps names, `numbers` and the words above them on one line as far as the width permits: a broken number would be read as two.
+fn keep_whole(table: &mut Table, header: &[&str], rows: &[Vec<String>], numbers: bool, padding: u16) {
     let limit = room(table.column_count());
     let names = table.column_max_content_widths().first().map_or(0, |width| usize::from(*width));
-    let figures: Vec<usize> = (1..table.column_count()).map(|k| widest(rows, k) + usize::from(padding)).collect();
-    let remaining = limit.saturating_sub(figures.iter().sum());
+    let cells: Vec<usize> = (1..table.column_count()).map(|k| widest(rows, k) + usize::from(padding)).collect();
+    let words =
+        |text: &&str| text.split(' ').map(|word| word.chars().count()).max().unwrap_or(0) + usize::from(padding);
+    let with_words: Vec<usize> =
+        cells.iter().enumerate().map(|(k, cell)| header.get(k + 1).map_or(0, words).max(*cell)).collect();
+    let remaining_of = |widths: &[usize]| limit.saturating_sub(widths.iter().sum());
+    let figures = if remaining_of(&with_words) > MIN_NAME_WIDTH { with_words } else { cells };
+    let remaining = remaining_of(&figures);
     if let Some(column) = table.column_mut(0).filter(|_| names <= limit / 2)
         && (!numbers || names + usize::from(padding) <= remaining)
     {
@@ -104,6 +120,31 @@ mod tests {
         let text = table(&header, &[row], true);
         assert!(text.lines().all(|line| line.chars().count() <= usize::from(MAX_WIDTH)), "{text}");
         assert!(numbers.iter().all(|number| text.contains(number)), "{text}");
+    }
+
+    #[test]
+    fn words_above_numbers_are_not_broken() {
+        let row = ["/vrpn_client_node/jackal/pose", "PoseStamped", "2283", "120.0", "1.000", "2282", "0", "0"]
+            .map(str::to_owned);
+        let text = table(&["topic", "type", "count", "Hz", "max s", "gaps", "lost", "late"], &[row.to_vec()], true);
+        assert!(["count", "late", "PoseStamped"].iter().all(|word| text.contains(word)), "{text}");
+        let row = ["/vrpn_client_node/jackal/pose", "-1771452805676.324", "118996138.54", "375.883", "regular"]
+            .map(str::to_owned);
+        let text = table(
+            &["stamps against log time", "offset ms", "drift ppm", "jitter ms", "pattern"],
+            &[row.to_vec()],
+            true,
+        );
+        assert!(["jitter", "regular", "-1771452805676.324"].iter().all(|word| text.contains(word)), "{text}");
+    }
+
+    #[test]
+    fn long_cells_are_cut() {
+        // A name of 4 MB took over a minute.
+        let rows = [vec!["\u{e9}".repeat(4 << 20), "12.5".to_owned()]];
+        let text = table(&["topic", "Hz"], &rows, true);
+        assert_eq!(text.matches('\u{e9}').count(), 200, "{text}");
+        assert!(text.contains('\u{2026}') && text.contains("12.5"), "{text}");
     }
 
     #[test]
