@@ -51,6 +51,17 @@ pub enum EstimationError {
         /// Number of samples.
         samples: usize,
     },
+    /// Both sensors have data at the same time, but never long enough without a gap.
+    #[error(
+        "IMU and lidar have {common_s:.3} s in common, but never {needed_s:.3} s without a gap; look at the rates and gaps of both \
+         topics with `zsim info`"
+    )]
+    Interrupted {
+        /// Length of the overlap, s.
+        common_s: f64,
+        /// Required length, s.
+        needed_s: f64,
+    },
     /// The data of the two sensors overlap too little in time.
     #[error("IMU and lidar have {common_s:.3} s in common; at least {needed_s:.3} s are needed to start")]
     TooShort {

@@ -197,7 +197,14 @@ impl Estimator {
         match self.intake.counts() {
             (0, scans) => EstimationError::NoImu { scans },
             (samples, 0) => EstimationError::NoLidar { samples },
-            _ => EstimationError::TooShort { common_s: self.intake.common_s(), needed_s: 2.0 * self.spec.step_s },
+            _ => {
+                let (common_s, needed_s) = (self.intake.common_s(), 2.0 * self.spec.step_s);
+                if common_s < needed_s {
+                    EstimationError::TooShort { common_s, needed_s }
+                } else {
+                    EstimationError::Interrupted { common_s, needed_s }
+                }
+            }
         }
     }
 }
