@@ -28,7 +28,10 @@ impl Reader {
         let topic = topic.unwrap_or(Topic::BaseImu.name());
         let candidates = self.candidates(&[MessageType::Imu], Some(topic), probe_imu)?;
         let frame = candidates.found.first().map_or("", |candidate| candidate.frame.as_str());
-        let base_from_imu = self.frame_tree()?.target_from_source(BASE, frame);
+        let base_from_imu = self.frames()?.target_from_source(BASE, frame).map_err(|problem| {
+            let problem = format!("the pose of the IMU {topic} is not known: {problem}");
+            RecordingError::Frames { name: self.name().to_owned(), problem }
+        })?;
         let unit =
             candidates.found.first().map(|candidate| self.force_unit(candidate)).transpose()?.unwrap_or_default();
         let (ids, mut loss) = (self.ids_of(topic), self.loss().clone());

@@ -106,8 +106,8 @@ pub enum RecordingError {
         /// Name of the file.
         name: String,
     },
-    /// The transform tree of `/tf_static` is not usable.
-    #[error("{name}: /tf_static {problem}")]
+    /// The transforms do not connect the sensors.
+    #[error("{name}: {problem}")]
     Frames {
         /// Name of the file.
         name: String,

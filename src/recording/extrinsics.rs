@@ -1,13 +1,21 @@
-//! Reads the extrinsics of a recording's sensors from `/tf_static`.
+//! Reads the extrinsics of a recording's sensors from `/tf_static`, or from `/tf` if they are constant there.
 
 use crate::container::{ChannelId, Messages};
-use crate::message::transforms::{self, Transform};
-use crate::schema::MessageType;
-use crate::topics::HEAD;
+use crate::frames::FrameTree;
+use crate::message::transforms::{self, ReadTransform};
+use crate::topics::{HEAD, shortened};
 use crate::{Reader, RecordingError, Selection};
 use std::collections::BTreeMap;
 use zsim_base::geometry::Pose;
 use zsim_base::measurement::Calibration;
+
+/// Last part of the name of the topic of static transforms.
+const STATIC: &str = "tf_static";
+/// Last part of the name of the topic of repeated transforms.
+const REPEATED: &str = "tf";
+
+const REMEDY: &str = "Select another sensor with --lidar-topic or --imu-topic, or give both poses with --calibration; a lidar on a \
+                      rotating mount is not supported";
 
 /// Calibration, and the origin of the poses.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,139 +24,216 @@ pub struct FoundCalibration {
     pub calibration: Calibration,
     /// Frame whose pose an estimate reports.
     pub body_frame: String,
-    /// Whether the poses are from `/tf_static`; otherwise they are the defaults.
+    /// Whether the poses are from the recording's transforms; otherwise they are the defaults.
     pub from_recording: bool,
+    /// Where the poses are from if not from `/tf_static`, and transforms that are not usable and not needed, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// The trees of static transforms: `/tf_static`, and those of namespaces.
+#[derive(Debug, Default)]
+pub(super) struct Frames(BTreeMap<String, FrameTree>);
+
+impl Frames {
+    /// Whether a tree connects two frames; true if there is no tree.
+    pub fn connects(&self, target: &str, source: &str) -> bool {
+        self.is_empty() || matches!(self.target_from_source(target, source), Ok(Some(_)))
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.values().all(FrameTree::is_empty)
+    }
+
+    /// Computes `target_from_source` by the first tree that connects the frames; `None` if none does.
+    ///
+    /// # Errors
+    /// When a transform between them is not usable: which, and why.
+    pub fn target_from_source(&self, target: &str, source: &str) -> Result<Option<Pose>, String> {
+        let mut refusal = Ok(None);
+        for tree in self.0.values() {
+            match tree.target_from_source(target, source) {
+                Ok(None) => {}
+                Ok(pose) => return Ok(pose),
+                Err(problem) => refusal = Err(problem),
+            }
+        }
+        refusal
+    }
 }
 
 impl Reader {
     /// Calibration of the selected sensors: poses from `/tf_static`, noise from `defaults`.
     ///
-    /// Without `/tf_static`, the poses are from `defaults` too.
+    /// If `/tf_static` does not connect the sensors, that of a namespace is used, then transforms of `/tf` that do not change.
+    /// Without transforms the poses are from `defaults` too.
     ///
     /// The body is `body_frame` if given, else `head` if the tree contains it, else the IMU's frame.
     ///
     /// # Errors
-    /// When the file cannot be read, or the tree does not connect the sensors and the body.
+    /// When the file cannot be read, the transforms do not connect the sensors and the body, or one between them is not usable.
     pub fn calibration(
         &self,
         selection: &Selection,
         defaults: &Calibration,
         body_frame: Option<&str>,
     ) -> Result<FoundCalibration, RecordingError> {
-        let tree = self.frame_tree()?;
-        let fallback = if tree.contains(HEAD) { HEAD } else { selection.imu_frame.as_str() };
-        let body = body_frame.unwrap_or(fallback);
-        let mut calibration = defaults.clone();
-        if tree.is_empty() {
-            let body_frame = body_frame.unwrap_or(HEAD).to_owned();
-            return Ok(FoundCalibration { calibration, body_frame, from_recording: false });
-        }
-        let find = |frame: &str| {
-            tree.target_from_source(body, frame).ok_or_else(|| RecordingError::Frames {
-                name: self.name().to_owned(),
-                problem: format!(
-                    "does not connect frame {frame} to {body}; it has {}. Select another sensor with --lidar-topic or --imu-topic, \
-                     or give both poses with --calibration; a lidar on a rotating mount (/tf) is not supported",
-                    tree.names()
-                ),
-            })
+        let frames = self.frames()?;
+        let wanted = Wanted { selection, body_frame, defaults };
+        let static_refusal = match wanted.of_static(&frames) {
+            Ok(found) => return Ok(found),
+            Err(refusal) => refusal,
         };
-        calibration.head_from_laser = find(&selection.lidar_frame)?;
-        calibration.head_from_imu = find(&selection.imu_frame)?;
-        Ok(FoundCalibration { calibration, body_frame: body.to_owned(), from_recording: true })
-    }
-
-    /// Whether `/tf_static` connects two frames; true if there is no tree.
-    pub(super) fn connects(&self, target: &str, source: &str) -> bool {
-        // Errors of the tree are reported where poses are read from it.
-        let tree = self.frame_tree().unwrap_or_default();
-        tree.is_empty() || tree.target_from_source(target, source).is_some()
-    }
-
-    /// Reads the tree of `/tf_static`.
-    pub(super) fn frame_tree(&self) -> Result<FrameTree, RecordingError> {
-        let is_static = |topic: &str| topic.trim_start_matches('/') == "tf_static";
-        let channels =
-            self.channels().iter().filter(|c| is_static(&c.topic) && MessageType::Transforms.is_named(&c.type_name));
-        let ids: Vec<ChannelId> = channels.map(|channel| channel.id).collect();
-        let tree = self.read_frame_tree(self.messages_in_blocks_of(&ids), &ids)?;
-        if ids.is_empty() || !tree.is_empty() { Ok(tree) } else { self.read_frame_tree(self.messages(), &ids) }
-    }
-
-    fn read_frame_tree(&self, mut messages: Messages<'_>, ids: &[ChannelId]) -> Result<FrameTree, RecordingError> {
-        let mut tree = FrameTree::default();
-        while let Some(message) = messages.next()? {
-            if !ids.contains(&message.channel) {
-                continue;
-            }
-            let decoded = transforms::decode(message.data).map_err(|error| error.to_string());
-            for transform in decoded.map_err(|problem| self.frames_error(problem))? {
-                tree.add(transform).map_err(|problem| self.frames_error(problem))?;
-            }
+        let repeated = self.read_trees(REPEATED, FrameTree::add_repeated)?;
+        let refusals = match wanted.of_repeated(&frames, &repeated) {
+            Ok(found) => return Ok(found),
+            Err(refusal) => static_refusal.into_iter().chain(refusal).collect::<Vec<_>>(),
+        };
+        if !refusals.is_empty() {
+            let problem = format!("{}. {REMEDY}", refusals.join(". "));
+            return Err(RecordingError::Frames { name: self.name().to_owned(), problem });
         }
-        Ok(tree)
+        let (calibration, body_frame) = (defaults.clone(), body_frame.unwrap_or(HEAD).to_owned());
+        Ok(FoundCalibration { calibration, body_frame, from_recording: false, notes: Vec::new() })
     }
 
-    fn frames_error(&self, problem: String) -> RecordingError {
-        RecordingError::Frames { name: self.name().to_owned(), problem }
-    }
-}
-
-/// Tree of frames, each with a parent and the pose in it.
-#[derive(Debug, Clone, Default)]
-pub(super) struct FrameTree {
-    parents: BTreeMap<String, (String, Pose)>,
-}
-
-impl FrameTree {
-    fn is_empty(&self) -> bool {
-        self.parents.is_empty()
-    }
-
-    fn contains(&self, frame: &str) -> bool {
-        self.parents.iter().any(|(child, (parent, _))| child == frame || parent == frame)
-    }
-
-    fn names(&self) -> String {
-        let edges: Vec<_> = self.parents.iter().map(|(child, (parent, _))| format!("{parent} -> {child}")).collect();
-        edges.join(", ")
-    }
-
-    /// Adds a transform.
+    /// Reads the trees of static transforms.
     ///
-    /// A repeated transform replaces the earlier one; a different parent is an error.
-    fn add(&mut self, transform: Transform) -> Result<(), String> {
-        let Transform { parent, child, parent_from_child } = transform;
-        match self.parents.get(&child) {
-            Some((known, _)) if *known != parent => {
-                Err(format!("gives frame {child} two parents, {known} and {parent}"))
-            }
-            _ => {
-                self.parents.insert(child, (parent, parent_from_child));
-                Ok(())
-            }
+    /// # Errors
+    /// When the file cannot be read. Transforms that are not usable are part of the tree.
+    pub(super) fn frames(&self) -> Result<Frames, RecordingError> {
+        Ok(Frames(self.read_trees(STATIC, FrameTree::add_static)?))
+    }
+
+    /// Reads the tree of each topic whose name ends with `ending`.
+    fn read_trees(
+        &self,
+        ending: &str,
+        add: fn(&mut FrameTree, ReadTransform),
+    ) -> Result<BTreeMap<String, FrameTree>, RecordingError> {
+        let is_wanted = |topic: &str| topic.rsplit('/').next() == Some(ending);
+        let channels = self.channels().iter().filter(|c| is_wanted(&c.topic) && transforms::is_type(&c.type_name));
+        let topics: BTreeMap<ChannelId, &str> = channels.map(|channel| (channel.id, channel.topic.as_str())).collect();
+        if topics.is_empty() {
+            return Ok(BTreeMap::new());
+        }
+        let ids: Vec<ChannelId> = topics.keys().copied().collect();
+        let trees = read_trees_from(self.messages_in_blocks_of(&ids), &topics, add)?;
+        // An index has no checksum and may be wrong.
+        if trees.is_empty() { read_trees_from(self.messages(), &topics, add) } else { Ok(trees) }
+    }
+}
+
+fn read_trees_from(
+    mut messages: Messages<'_>,
+    topics: &BTreeMap<ChannelId, &str>,
+    add: fn(&mut FrameTree, ReadTransform),
+) -> Result<BTreeMap<String, FrameTree>, RecordingError> {
+    let mut trees: BTreeMap<String, FrameTree> = BTreeMap::new();
+    while let Some(message) = messages.next()? {
+        let Some(topic) = topics.get(&message.channel) else { continue };
+        // A message that cannot be decoded has no transform: the sensors are then not connected, which is reported.
+        for transform in transforms::decode(message.data).unwrap_or_default() {
+            let tree = trees.entry((*topic).to_owned()).or_default();
+            add(tree, transform);
         }
     }
+    Ok(trees)
+}
 
-    /// Computes `target_from_source`; `None` if the frames have different roots.
-    pub(super) fn target_from_source(&self, target: &str, source: &str) -> Option<Pose> {
-        let (target_root, root_from_target) = self.root_of(target)?;
-        let (source_root, root_from_source) = self.root_of(source)?;
-        (target_root == source_root).then(|| root_from_target.inverse() * root_from_source)
-    }
+/// Whether a topic of static transforms is in no namespace.
+fn is_plain(topic: &str) -> bool {
+    topic.trim_start_matches('/') == STATIC
+}
 
-    /// Root above `frame` and `root_from_frame`; `None` if the tree has a cycle.
-    fn root_of<'a>(&'a self, frame: &'a str) -> Option<(&'a str, Pose)> {
-        let (mut current, mut root_from_frame) = (frame, Pose::identity());
-        for _ in 0..=self.parents.len() {
-            match self.parents.get(current) {
-                None => return Some((current, root_from_frame)),
-                Some((parent, parent_from_at)) => {
-                    root_from_frame = parent_from_at * root_from_frame;
-                    current = parent;
+/// Why the pose of a sensor is not known.
+enum NoPose {
+    /// The tree does not connect it to the body.
+    Unconnected(String),
+    /// A transform between them is not usable.
+    Unusable(String),
+}
+
+/// Sensors whose poses are wanted.
+struct Wanted<'a> {
+    selection: &'a Selection,
+    body_frame: Option<&'a str>,
+    defaults: &'a Calibration,
+}
+
+impl Wanted<'_> {
+    /// The poses by the first tree of static transforms that connects the sensors; else why the first one does not, if there is one.
+    fn of_static(&self, frames: &Frames) -> Result<FoundCalibration, Option<String>> {
+        let mut trees: Vec<_> = frames.0.iter().filter(|(_, tree)| !tree.is_empty()).collect();
+        let is_of_lidar = |topic: &str| self.selection.lidar_topic.starts_with(topic.trim_end_matches(STATIC));
+        trees.sort_by_key(|(topic, _)| (!is_plain(topic), !is_of_lidar(topic)));
+        let mut refusal = None;
+        for (topic, tree) in trees {
+            let origin = (!is_plain(topic)).then(|| format!("The poses of the sensors are from {}.", shortened(topic)));
+            match self.poses(tree, origin, tree.problems()) {
+                Ok(found) => return Ok(found),
+                Err(NoPose::Unconnected(text)) => {
+                    refusal.get_or_insert_with(|| format!("{} {text}", shortened(topic)));
+                }
+                Err(NoPose::Unusable(problem)) => {
+                    refusal.get_or_insert_with(|| format!("{} is not usable: {problem}", shortened(topic)));
                 }
             }
         }
-        None
+        Err(refusal)
+    }
+
+    /// The poses by transforms of `repeated` that do not change, with the static ones of the same namespace; else why they are
+    /// not usable, if they join the sensors.
+    fn of_repeated(
+        &self,
+        frames: &Frames,
+        repeated: &BTreeMap<String, FrameTree>,
+    ) -> Result<FoundCalibration, Option<String>> {
+        let [lidar, imu] = [&self.selection.lidar_frame, &self.selection.imu_frame];
+        let mut refusal = None;
+        for (topic, repeated) in repeated {
+            let fixed = frames.0.get(&format!("{topic}_static")).cloned().unwrap_or_default();
+            let problems = fixed.problems();
+            let mut tree = fixed;
+            tree.extend(repeated);
+            if lidar == imu || !tree.contains(lidar) || !tree.contains(imu) {
+                continue;
+            }
+            let topic = shortened(topic);
+            let origin = format!("The poses of the sensors are from {topic}, where they are constant.");
+            match self.poses(&tree, Some(origin), problems) {
+                Ok(found) => return Ok(found),
+                Err(NoPose::Unusable(problem)) => {
+                    let (lidar, imu) = (shortened(lidar), shortened(imu));
+                    refusal = Some(format!("{topic} joins the frames {lidar} and {imu}, but {problem}"));
+                }
+                Err(NoPose::Unconnected(_)) => {}
+            }
+        }
+        Err(refusal)
+    }
+
+    /// The poses by a tree; `origin` states where it is from, `problems` which of its transforms are not usable.
+    fn poses(
+        &self,
+        tree: &FrameTree,
+        origin: Option<String>,
+        problems: Vec<String>,
+    ) -> Result<FoundCalibration, NoPose> {
+        let fallback = if tree.contains(HEAD) { HEAD } else { self.selection.imu_frame.as_str() };
+        let body = self.body_frame.unwrap_or(fallback);
+        let find = |frame: &str| {
+            let pose = tree.target_from_source(body, frame).map_err(NoPose::Unusable)?;
+            pose.ok_or_else(|| {
+                let (frame, body) = (shortened(frame), shortened(body));
+                NoPose::Unconnected(format!("does not connect frame {frame} to {body}; it has {}", tree.names()))
+            })
+        };
+        let head_from_laser = find(&self.selection.lidar_frame)?;
+        let head_from_imu = find(&self.selection.imu_frame)?;
+        let calibration = Calibration { head_from_laser, head_from_imu, ..self.defaults.clone() };
+        let unneeded = |problem: String| format!("Not used, and not needed: {problem}.");
+        let notes = origin.into_iter().chain(problems.into_iter().map(unneeded)).collect();
+        Ok(FoundCalibration { calibration, body_frame: body.to_owned(), from_recording: true, notes })
     }
 }

@@ -6,7 +6,7 @@ mod intervals;
 pub use clock::ClockStatistics;
 
 use crate::container::{Channel, ChannelId, RawMessage};
-use crate::schema::MessageType;
+use crate::message::transforms;
 use crate::wire::Decoder;
 use crate::{Loss, Reader, RecordingError};
 use clock::ClockFit;
@@ -159,10 +159,10 @@ fn topic_info(channel: &Channel, accumulator: TopicAccumulator) -> TopicInfo {
 fn stamp_of(message: &RawMessage<'_>, channel: &Channel) -> Option<Stamp> {
     channel.wire?;
     let mut input = Decoder::new(message.data).ok()?;
-    if MessageType::Transforms.is_named(&channel.type_name) {
+    if transforms::is_type(&channel.type_name) {
         // The stamp of the first transform, after the number of transforms.
         let count = input.u32().ok()?;
-        return if count > 0 { input.time().ok() } else { None };
+        return if count > 0 { input.header_stamp().ok() } else { None };
     }
-    if channel.has_header { input.time().ok() } else { None }
+    if channel.has_header { input.header_stamp().ok() } else { None }
 }

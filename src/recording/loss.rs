@@ -1,5 +1,7 @@
 use super::clock_step::ClockStep;
 use super::container::{Ending, FileIndex, Messages};
+use super::message::transforms::{is_frame, printable_frame};
+use super::topics::shortened;
 use serde::Serialize;
 use std::fmt;
 
@@ -22,6 +24,10 @@ pub struct Loss {
     pub unreadable_messages: u64,
     /// Number of IMU samples with NaN or infinity.
     pub samples_not_finite: u64,
+    /// Number of lidar returns whose time is far from those of their cloud.
+    pub impossible_point_times: u64,
+    /// Messages on a sensor's topic whose frame is not the sensor's; not a loss.
+    pub other_frames: Vec<OtherFrame>,
     /// Number of duplicate scans, each used once; not a loss.
     pub repeated_scans: u64,
     /// Number of duplicate IMU samples, each used once; not a loss.
@@ -32,7 +38,35 @@ pub struct Loss {
     pub clock_steps: Vec<ClockStep>,
 }
 
+/// Messages on a sensor's topic that have another frame than the sensor.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OtherFrame {
+    /// Topic name.
+    pub topic: String,
+    /// Frame; of many frames the last ones count as one, `other frames`.
+    pub frame: String,
+    /// Number of messages.
+    pub messages: u64,
+}
+
+/// Maximum number of other frames that are distinguished.
+const MAX_OTHER_FRAMES: usize = 8;
+
 impl Loss {
+    /// Counts a message on `topic` that has another frame than the sensor.
+    pub(super) fn add_other_frame(&mut self, topic: &str, frame: &str) {
+        let is_full = self.other_frames.len() >= MAX_OTHER_FRAMES;
+        let known = |other: &&mut OtherFrame| other.topic == topic && is_frame(frame, &other.frame);
+        if let Some(other) = self.other_frames.iter_mut().find(known) {
+            other.messages += 1;
+        } else if let Some(last) = self.other_frames.last_mut().filter(|_| is_full) {
+            last.messages += 1;
+            "other frames".clone_into(&mut last.frame);
+        } else {
+            self.other_frames.push(OtherFrame { topic: topic.to_owned(), frame: printable_frame(frame), messages: 1 });
+        }
+    }
+
     /// Losses of the files, according to their indices.
     pub(super) fn of_files<'d>(indices: impl Iterator<Item = &'d FileIndex>) -> Self {
         indices.fold(Self::default(), |loss, index| Self {
@@ -53,24 +87,31 @@ impl Loss {
     /// Whether no data were lost.
     pub fn is_none(&self) -> bool {
         let Self { repeated_scans, repeated_samples, outlying_stamps, .. } = *self;
-        let clock_steps = self.clock_steps.clone();
-        *self == Self { repeated_scans, repeated_samples, outlying_stamps, clock_steps, ..Self::default() }
+        let (clock_steps, other_frames) = (self.clock_steps.clone(), self.other_frames.clone());
+        let notes =
+            Self { repeated_scans, repeated_samples, outlying_stamps, clock_steps, other_frames, ..Self::default() };
+        *self == notes
     }
 
     /// Notes on data skipped without loss, one sentence each.
     pub fn notes(&self) -> Vec<String> {
         let counted = |count: u64, sentence: &str| (count > 0).then(|| format!("{count} {sentence}"));
-        [
+        let counts = [
             counted(self.repeated_scans, "duplicate scans were ignored"),
             counted(self.repeated_samples, "duplicate IMU samples were ignored"),
             counted(
                 self.outlying_stamps,
                 "messages were dropped: their stamps are far from those before and after them",
             ),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        ];
+        let other_frame = |other: &OtherFrame| {
+            let OtherFrame { topic, frame, messages } = other;
+            format!(
+                "{messages} messages of {topic} have the frame {}, not that of the sensor, and were not used",
+                shortened(frame)
+            )
+        };
+        counts.into_iter().flatten().chain(self.other_frames.iter().map(other_frame)).collect()
     }
 
     /// Descriptions of the losses, one sentence each.
@@ -85,6 +126,10 @@ impl Loss {
             counted(self.missing_messages, "messages (all topics together) are missing."),
             counted(self.unreadable_messages, "messages do not match their type and were skipped."),
             counted(self.samples_not_finite, "IMU samples are not finite and were skipped."),
+            counted(
+                self.impossible_point_times,
+                "lidar returns have times far from those of their cloud and were skipped.",
+            ),
         ]
         .into_iter()
         .flatten()

@@ -2,13 +2,15 @@
 
 use crate::container::{ChannelId, Messages};
 use crate::duplicates::DuplicateFilter;
+use crate::message::point_times::{CloudTimes, PointTimes, RawCloud, TimedScan};
 use crate::message::scan::Projector;
+use crate::message::transforms::is_frame;
 use crate::message::{imu, livox, multi_echo, points, scan};
 use crate::pairing::ImuPairing;
 use crate::selection::{ImuDecoding, ImuLayout, LidarDecoding, LidarKind};
 use crate::stamp_screen::StampScreen;
 use crate::stamp_sorter::StampSorter;
-use crate::wire::{DecodeError, Payload};
+use crate::wire::{DecodeError, Decoder, Payload};
 use crate::{Loss, Reader, RecordingError, Selection};
 use zsim_base::measurement::{ImuSample, LidarScan, Measurement};
 use zsim_base::time::{Span, Stamp};
@@ -78,14 +80,25 @@ impl LidarDecoding {
     ///
     /// # Errors
     /// When the bytes do not match the lidar's message type.
-    pub fn decode(&self, message: Payload<'_>, projector: &mut Projector) -> Result<LidarScan, DecodeError> {
+    pub fn decode(&self, message: Payload<'_>, projector: &mut Projector) -> Result<TimedScan, DecodeError> {
         let (stamp, planar) = match self.kind {
-            LidarKind::Points => return points::decode(message, self.time_unit, self.no_return_range_m),
-            LidarKind::Livox => return livox::decode(message, self.no_return_range_m),
+            LidarKind::Points => {
+                let source = self.times.and_then(|times| times.source());
+                return Ok(self.timed(points::decode(message, source, self.no_return_range_m)?));
+            }
+            LidarKind::Livox => return Ok(self.timed(livox::decode(message, self.no_return_range_m)?)),
             LidarKind::Scan => scan::decode(message)?,
             LidarKind::MultiEcho => multi_echo::decode(message)?,
         };
-        Ok(projector.project(stamp, planar, self.no_return_range_m))
+        let scan = projector.project(stamp, planar, self.no_return_range_m);
+        Ok(TimedScan { scan, impossible_times: 0 })
+    }
+
+    /// Converts the times of a cloud; without times of the lidar they are detected from this cloud.
+    fn timed(&self, cloud: RawCloud) -> TimedScan {
+        let of_cloud = || Some(PointTimes::detect(&[CloudTimes::of(&cloud)?])?.0);
+        let times = self.times.or_else(of_cloud).unwrap_or(PointTimes::AtStamp);
+        times.scan(cloud)
     }
 }
 
@@ -141,9 +154,15 @@ impl MeasurementDecoder {
         sorter: &mut StampSorter,
         loss: &mut Loss,
     ) {
+        if let Some((topic, frame)) = self.other_frame(role, message) {
+            return loss.add_other_frame(topic, frame);
+        }
         if role == Role::Lidar {
             match self.selection.lidar.decode(message, &mut self.projector) {
-                Ok(scan) => self.scan(log, scan, sorter),
+                Ok(timed) => {
+                    loss.impossible_point_times += timed.impossible_times;
+                    self.scan(log, timed.scan, sorter);
+                }
                 Err(_) => loss.unreadable_messages += 1,
             }
         } else {
@@ -154,6 +173,19 @@ impl MeasurementDecoder {
             }
         }
         self.report(loss);
+    }
+
+    /// Topic and frame of a message that has another frame than its sensor.
+    fn other_frame<'m>(&self, role: Role, message: Payload<'m>) -> Option<(&str, &'m str)> {
+        let Selection { lidar_topic, lidar_frame, imu_topic, imu_frame, imu, .. } = &self.selection;
+        let (topic, expected) = match role {
+            Role::Lidar => (lidar_topic, lidar_frame),
+            Role::Imu if imu.layout == ImuLayout::Combined => (imu_topic, imu_frame),
+            // Gyroscope and accelerometer may have frames of their own.
+            Role::Imu | Role::Acceleration => return None,
+        };
+        let (_, frame) = Decoder::new(message).and_then(|mut input| input.header()).ok()?;
+        (!is_frame(frame, expected)).then_some((topic, frame))
     }
 
     fn scan(&mut self, log: Option<Stamp>, scan: LidarScan, sorter: &mut StampSorter) {

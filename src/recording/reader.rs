@@ -1,7 +1,8 @@
 //! Opens a recording for reading, written by zsim or by another program.
 
-use crate::container::{Block, Channel, ChannelId, Messages, RawMessage, RecordingFile};
+use crate::container::{Block, BlockKind, Channel, ChannelId, Messages, RawMessage, RecordingFile};
 use crate::folder::list_files;
+use crate::topics::shortened;
 use crate::{Loss, RecordingError};
 use std::io::{Read, Seek};
 use std::path::Path;
@@ -88,7 +89,8 @@ impl Reader {
 
     /// List of the topics with their types, for messages.
     pub(super) fn topic_list(&self) -> String {
-        let mut topics: Vec<_> = self.channels.iter().map(|c| format!("{} ({})", c.topic, c.type_name)).collect();
+        let mut topics: Vec<_> =
+            self.channels.iter().map(|c| format!("{} ({})", shortened(&c.topic), shortened(&c.type_name))).collect();
         topics.sort();
         topics.dedup();
         if topics.is_empty() { "no topics".to_owned() } else { topics.join(", ") }
@@ -146,8 +148,28 @@ impl Reader {
         Ok(())
     }
 
-    /// Number of messages according to the summaries.
+    /// Number of messages according to the summaries; `None` if a file has none, or its number cannot be right.
     pub(super) fn expected_messages(&self) -> Option<u64> {
-        self.files.iter().map(|file| file.index.expected_messages).sum()
+        self.files.iter().try_fold(0_u64, |sum, file| {
+            let expected = file.index.expected_messages?;
+            let possible = file.index.blocks.iter().fold(0_u64, |sum, block| sum.saturating_add(max_messages(block)));
+            (expected <= possible).then(|| sum.saturating_add(expected))
+        })
     }
+}
+
+/// Maximum number of messages in a block, from its size.
+fn max_messages(block: &Block) -> u64 {
+    /// Bytes of an MCAP message without data; those of other formats are longer.
+    const MESSAGE_BYTES: u64 = 31;
+    /// Maximum compression of a chunk that is credible.
+    const MAX_COMPRESSION: u64 = 4096;
+    let bytes = match &block.kind {
+        BlockKind::Chunk(chunk) => chunk.uncompressed_size.min(block.length.saturating_mul(MAX_COMPRESSION)),
+        BlockKind::BagChunk(chunk) => chunk.size.min(block.length.saturating_mul(MAX_COMPRESSION)),
+        BlockKind::Plain => block.length,
+        // The rows are counted.
+        BlockKind::Rows { .. } => return u64::MAX,
+    };
+    bytes / MESSAGE_BYTES
 }

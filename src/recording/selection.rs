@@ -2,17 +2,25 @@
 
 mod candidates;
 mod clocks;
+mod cloud_preview;
 mod content;
+mod drivers;
 mod imu_choice;
+mod lidar_choice;
+mod notes;
 mod preview;
+mod unused;
 
 use crate::message::no_returns::NoReturnDetector;
+use crate::message::point_times::PointTimes;
 use crate::message::{imu, multi_echo, points, scan};
+use crate::quantile::quantile;
 use crate::schema::MessageType;
 use crate::{Reader, RecordingError};
-use candidates::BeamTimes;
 pub(super) use candidates::{Candidate, LidarKind, probe_imu};
 pub(super) use imu_choice::ImuLayout;
+use notes::Choice;
+pub use unused::UnusedTopic;
 use zsim_base::time::Span;
 
 /// Topics that the caller requests; topics not given are detected.
@@ -37,6 +45,8 @@ pub struct Selection {
     pub imu_frame: String,
     /// Choices among several topics and corrections of unusual encodings, one sentence each.
     pub notes: Vec<String>,
+    /// Other topics with messages of these sensors.
+    pub unused: Vec<UnusedTopic>,
     pub(super) lidar: LidarDecoding,
     pub(super) imu: ImuDecoding,
 }
@@ -63,8 +73,8 @@ impl Selection {
 pub struct LidarDecoding {
     /// Message encoding.
     pub kind: LidarKind,
-    /// Unit of the points' times, if the clouds show that it is not the usual one.
-    pub time_unit: Option<points::TimeUnit>,
+    /// How to convert the times of points; `None` if the first clouds do not show it.
+    pub times: Option<PointTimes>,
     /// Constant range that encodes beams without a return, m, if there is one.
     pub no_return_range_m: Option<f32>,
 }
@@ -88,7 +98,7 @@ const LIDAR_TYPES: [MessageType; 5] = [
     MessageType::Livox2,
 ];
 
-/// Clouds used to detect the unit of point times, and scans used to measure their duration: enough for a median.
+/// Clouds from which the encoding of point times is detected, and scans whose duration is measured: enough for a median.
 const PREVIEW_MESSAGES: usize = 20;
 
 /// Blocks of the recording in which beams without a return are counted, and messages per block.
@@ -114,61 +124,47 @@ impl Reader {
         };
         let all_imus = if requested.is_some() { &others } else { &imus.found };
         let imu = self.choose_imu(&imus.found, all_imus)?;
-        let is_connected =
-            |lidar: &Candidate| imu.as_ref().is_none_or(|imu| self.connects(&imu.candidate.frame, &lidar.frame));
-        let rank = |c: &&Candidate| (!is_connected(c), c.times, is_cloud(c), c.topic.clone());
-        let (lidar, kind) =
-            lidars.found.iter().min_by_key(rank).and_then(|lidar| Some((lidar, lidar.kind?))).ok_or_else(|| {
-                self.no_sensor(
-                    "lidar",
-                    "LaserScan, MultiEchoLaserScan, PointCloud2 or CustomMsg of Livox",
-                    &lidars.unusable,
-                )
-            })?;
+        let frames = self.frames()?;
+        let chosen = lidar_choice::choose(&lidars.found, |lidar| {
+            imu.as_ref().is_none_or(|imu| frames.connects(&imu.candidate.frame, &lidar.frame))
+        });
+        let (lidar, kind, other_lidars) = chosen.ok_or_else(|| {
+            let needs = "LaserScan, MultiEchoLaserScan, PointCloud2 or CustomMsg of Livox";
+            self.no_sensor("lidar", needs, &lidars.unusable)
+        })?;
         let imu = imu.ok_or_else(|| self.no_sensor("IMU", "sensor_msgs/msg/Imu", &imus.unusable))?;
         let detector = self.detect_no_returns(lidar, kind)?;
-        let time_unit = match kind {
-            LidarKind::Points => self.point_time_unit(&lidar.topic)?,
-            _ => None,
-        };
-        let lidar_reading = LidarDecoding { kind, time_unit, no_return_range_m: detector.no_return_range_m() };
+        let no_return_range_m = detector.no_return_range_m();
+        let clouds = self.preview_clouds(&lidar.topic, kind, no_return_range_m)?;
+        let lidar_reading = LidarDecoding { kind, times: clouds.times, no_return_range_m };
+        let lidar_headers = self.preview_headers(&lidar.topic)?;
         let scan_duration_s = self.scan_duration_s(lidar, lidar_reading)?;
-        let shift = clocks::find_offset(&imu.preview.log_times, &self.log_times(&lidar.topic)?, scan_duration_s);
-        let notes = [
-            note_on_choice("lidar", lidar, &lidars.found),
-            note_on_choice("IMU", &imu.candidate, &imus.found),
-            note_on_times(lidar),
-            time_unit.map(|unit| note_on_unit(lidar, unit)),
-            (imu.unit != imu::ForceUnit::default()).then(|| note_on_force(&imu.candidate.topic)),
-            note_on_layout(&imu.candidate, &imu.layout),
-            detector.note(&lidar.topic),
-            (kind == LidarKind::MultiEcho).then(|| note_on_echoes(lidar)),
-            shift.map(|shift| note_on_shift(&imu.candidate, lidar, shift)),
-        ];
-        let unusable = lidars.unusable.iter().chain(&imus.unusable).map(|reason| format!("Not used: {reason}."));
+        let shift = clocks::find_offset(&imu.preview.log_times, &lidar_headers.log_times, scan_duration_s);
+        let lidar_frame = lidar_headers.frames.main().unwrap_or(&lidar.frame).to_owned();
+        let imu_frame = imu.preview.frames.main().unwrap_or(&imu.candidate.frame).to_owned();
+        let choice = Choice {
+            lidar,
+            lidars: &lidars.found,
+            headers: &lidar_headers,
+            clouds: &clouds,
+            no_returns: &detector,
+            imu: &imu,
+            imus: &imus.found,
+            shift,
+        };
+        let notes = choice.notes();
+        let unusable = || lidars.unusable.iter().chain(&imus.unusable);
+        let unusable_notes = unusable().map(|unused| format!("Not used: {unused}."));
         Ok(Selection {
             lidar_topic: lidar.topic.clone(),
-            lidar_frame: lidar.frame.clone(),
+            lidar_frame,
             imu_topic: imu.candidate.topic.clone(),
-            imu_frame: imu.candidate.frame.clone(),
-            notes: notes.into_iter().flatten().chain(unusable).collect(),
+            imu_frame,
+            notes: notes.into_iter().chain(unusable_notes).collect(),
+            unused: other_lidars.into_iter().chain(imu.unused).chain(unusable().cloned()).collect(),
             lidar: lidar_reading,
             imu: ImuDecoding { unit: imu.unit, layout: imu.layout, shift: shift.unwrap_or(Span::ZERO) },
         })
-    }
-
-    /// Detects the time unit of a topic from the first clouds, see [`points::TimeUnit::detect`].
-    fn point_time_unit(&self, topic: &str) -> Result<Option<points::TimeUnit>, RecordingError> {
-        let ids = self.ids_of(topic);
-        let (mut messages, mut durations) = (self.messages_in_blocks_of(&ids), Vec::new());
-        while durations.len() < PREVIEW_MESSAGES {
-            let Some(message) = messages.next()? else { break };
-            if ids.contains(&message.channel) {
-                let Some(cloud) = points::duration(message.data) else { return Ok(None) };
-                durations.push(cloud);
-            }
-        }
-        Ok(points::TimeUnit::detect(&durations))
     }
 
     /// Detects how the lidar encodes beams without a return, from messages across the recording.
@@ -202,93 +198,23 @@ impl Reader {
             if !ids.contains(&message.channel) {
                 continue;
             }
-            if let Ok(scan) = reading.decode(message.data, &mut projector) {
+            if let Ok(timed) = reading.decode(message.data, &mut projector) {
+                let scan = timed.scan;
                 let last = scan.returns.last().map_or(Span::ZERO, |last| last.offset);
                 durations_s.push((last - scan.stamped_after).seconds());
             }
         }
-        Ok(content::quantile(durations_s, 0.5))
+        Ok(quantile(durations_s, 0.5))
     }
 
-    fn no_sensor(&self, sensor: &'static str, needs: &'static str, unusable: &[String]) -> RecordingError {
+    fn no_sensor(&self, sensor: &'static str, needs: &'static str, unusable: &[UnusedTopic]) -> RecordingError {
         let name = self.name().to_owned();
+        let drivers = drivers::hint(self.channels());
         if unusable.is_empty() {
-            return RecordingError::NoSensor { name, sensor, needs, has: self.topic_list() };
+            let has = format!("{}{drivers}", self.topic_list());
+            return RecordingError::NoSensor { name, sensor, needs, has };
         }
-        RecordingError::Unusable { name, sensor, reasons: unusable.join("; ") }
-    }
-}
-
-fn is_cloud(lidar: &Candidate) -> bool {
-    matches!(lidar.kind, Some(LidarKind::Points | LidarKind::Livox))
-}
-
-/// Reports which of several sensors is used. Another topic in the same frame is the same sensor.
-fn note_on_choice(sensor: &str, chosen: &Candidate, all: &[Candidate]) -> Option<String> {
-    let mut others: Vec<_> =
-        all.iter().filter(|c| c.topic != chosen.topic && c.frame != chosen.frame).map(|c| c.topic.as_str()).collect();
-    others.sort_unstable();
-    (!others.is_empty())
-        .then(|| format!("Of several {sensor} topics, {} is used, not {}.", chosen.topic, others.join(", ")))
-}
-
-fn note_on_layout(imu: &Candidate, layout: &ImuLayout) -> Option<String> {
-    let ImuLayout::Separate { acceleration_topic, max_separation } = layout else { return None };
-    let max_ms = 1e3 * max_separation.seconds();
-    Some(match acceleration_topic {
-        Some(forces) => format!(
-            "{} has angular velocities only: each is paired with the nearest acceleration of {forces}, within {max_ms:.1} ms.",
-            imu.topic
-        ),
-        None => format!(
-            "{} has angular velocities and accelerations in separate messages: they are paired by stamp, within \
-             {max_ms:.1} ms.",
-            imu.topic
-        ),
-    })
-}
-
-fn note_on_echoes(lidar: &Candidate) -> String {
-    format!(
-        "{} has several echoes per beam: the strongest is used, or the first if there are no intensities.",
-        lidar.topic
-    )
-}
-
-fn note_on_shift(imu: &Candidate, lidar: &Candidate, shift: Span) -> String {
-    format!(
-        "By log times, the stamps of {} and {} differ by {:.3} s: {0} is shifted by {:+.3} s; the estimator determines the remainder.",
-        imu.topic,
-        lidar.topic,
-        shift.seconds().abs(),
-        shift.seconds()
-    )
-}
-
-fn note_on_force(imu: &str) -> String {
-    format!("{imu} has accelerations in g, not in m/s^2: they are multiplied by 9.80665.")
-}
-
-fn note_on_unit(lidar: &Candidate, unit: points::TimeUnit) -> String {
-    let (topic, unit) = (&lidar.topic, unit.name());
-    format!("{topic} has point times in {unit}: in the usual unit its clouds would last implausibly long or short.")
-}
-
-fn note_on_times(lidar: &Candidate) -> Option<String> {
-    match lidar.times {
-        BeamTimes::Stated => None,
-        BeamTimes::OtherClock => Some(format!(
-            "{} has point times of another clock than its clouds' stamps: they are counted from each cloud's first \
-             point, which is assumed to be fired at the stamp.",
-            lidar.topic
-        )),
-        BeamTimes::Implied => Some(format!(
-            "{} states no time between beams; uniform rotation is assumed, one revolution per scan_time.",
-            lidar.topic
-        )),
-        BeamTimes::Unknown => Some(format!(
-            "{} states no beam times; all beams of a scan are assumed to be fired at its stamp, so motion distorts it.",
-            lidar.topic
-        )),
+        let reasons: Vec<_> = unusable.iter().map(UnusedTopic::to_string).collect();
+        RecordingError::Unusable { name, sensor, reasons: reasons.join("; ") + &drivers }
     }
 }

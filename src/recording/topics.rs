@@ -34,6 +34,18 @@ pub fn printable(name: &str) -> String {
     printed
 }
 
+/// Maximum length of a name in a message, characters.
+const MAX_NAME: usize = 80;
+
+/// Printable form of a name for messages; a longer one is cut.
+pub fn shortened(name: &str) -> String {
+    let mut start: String = name.chars().take(MAX_NAME).collect();
+    if start.len() < name.len() {
+        start.push('\u{2026}');
+    }
+    printable(&start)
+}
+
 /// Topic that zsim writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Topic {

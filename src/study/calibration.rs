@@ -67,7 +67,8 @@ pub(super) fn calibration(
     };
     if head_from_laser.is_some() && head_from_imu.is_some() {
         let body_frame = body_frame.unwrap_or("head").to_owned();
-        return Ok((FoundCalibration { calibration: defaults, body_frame, from_recording: false }, models));
+        let (from_recording, notes) = (false, Vec::new());
+        return Ok((FoundCalibration { calibration: defaults, body_frame, from_recording, notes }, models));
     }
     let mut found = reader.calibration(selection, &defaults, body_frame)?;
     let calibration = &mut found.calibration;

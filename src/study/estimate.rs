@@ -355,11 +355,11 @@ fn report_notes(
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) {
-    selection.notes.iter().for_each(|note| watch.note(note));
+    selection.notes.iter().chain(&found.notes).for_each(|note| watch.note(note));
     let given = options.calibration.head_from_laser.is_some() && options.calibration.head_from_imu.is_some();
     if !found.from_recording && !given {
         watch.note(
-            "the recording has no /tf_static: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
+            "no transforms of the recording join lidar and IMU: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
              extrinsics with --calibration",
         );
     }

@@ -2,8 +2,9 @@
 
 mod damage;
 mod drivers;
-mod foreign;
+pub mod foreign;
 mod formats;
+mod frames;
 mod killed;
 mod las;
 mod live;
@@ -13,6 +14,7 @@ mod programs;
 pub mod readers;
 mod result;
 mod round_trip;
+mod sensors;
 mod stamps;
 
 use proptest::test_runner::{Config, FileFailurePersistence};

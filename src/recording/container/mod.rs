@@ -18,6 +18,6 @@ mod record;
 mod recording_file;
 mod source;
 
-pub use file_index::{Block, Channel, ChannelId, Ending, FileIndex};
+pub use file_index::{Block, BlockKind, Channel, ChannelId, Ending, FileIndex};
 pub use messages::{Messages, RawMessage};
 pub use recording_file::RecordingFile;

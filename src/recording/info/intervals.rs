@@ -58,7 +58,7 @@ impl Intervals {
         self.statistics.longest = self.statistics.longest.max(Some(interval));
         self.statistics.gaps += u64::from(interval > gap);
         match self.statistics.period {
-            Some(period) => self.statistics.missing += missing_in(interval, period),
+            Some(period) => self.add_missing(missing_in(interval, period)),
             None => self.learning.push(interval),
         }
         if self.learning.len() >= LEARNING_INTERVALS {
@@ -74,12 +74,21 @@ impl Intervals {
             stamp_s
         });
         let stamps_s: Vec<f64> = std::iter::once(0.0).chain(after).collect();
-        let Some(found) = Regularity::of(&stamps_s).or_else(|| only_interval(&stamps_s)) else {
+        let found = Regularity::of(&stamps_s).or_else(|| only_interval(&stamps_s));
+        // Stamps of a few nanoseconds after each other have no period.
+        let is_positive = |found: &Regularity| Span::from_seconds(found.period_s) > Span::ZERO;
+        let Some(found) = found.filter(is_positive) else {
             return self.learning.clear();
         };
         let period = Span::from_seconds(found.period_s);
         (self.statistics.period, self.statistics.pattern) = (Some(period), Some(found.pattern));
-        self.statistics.missing += self.learning.drain(..).map(|interval| missing_in(interval, period)).sum::<u64>();
+        for interval in std::mem::take(&mut self.learning) {
+            self.add_missing(missing_in(interval, period));
+        }
+    }
+
+    fn add_missing(&mut self, missing: u64) {
+        self.statistics.missing = self.statistics.missing.saturating_add(missing);
     }
 
     /// Completes the statistics.
@@ -145,6 +154,20 @@ mod tests {
             let found = statistics((0..4000).map(|k| k / in_burst * 10 * in_burst));
             assert_eq!((found.missing, found.pattern), (0, Some(StampPattern::Bursts)), "{in_burst}");
         }
+    }
+
+    #[test]
+    fn stamps_without_a_period_have_no_missing_messages() {
+        // All equal; then half a nanosecond apart on average, and a gap of 10 s.
+        let of_ns = |stamps: &mut dyn Iterator<Item = i64>| {
+            let mut intervals = Intervals::default();
+            stamps.for_each(|ns| intervals.add(Stamp::from_nanos(ns), Span::from_seconds(0.5)));
+            intervals.finish().missing
+        };
+        assert_eq!(of_ns(&mut [0; 30].into_iter()), 0);
+        assert_eq!(of_ns(&mut (0..3000).map(|k| k / 2).chain([10_000_000_000])), 0);
+        // No sum of missing messages exceeds the number type.
+        assert!(of_ns(&mut (0..3000).map(|k| k * 3).chain([i64::MAX, i64::MAX])) > 0);
     }
 
     #[test]

@@ -6,6 +6,7 @@ pub mod imu;
 pub mod livox;
 pub mod multi_echo;
 pub mod no_returns;
+pub mod point_times;
 pub mod points;
 pub mod pose;
 pub mod scan;

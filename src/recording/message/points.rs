@@ -1,15 +1,16 @@
 //! `sensor_msgs/PointCloud2`: points with driver-specific fields.
 
 mod fields;
-mod time_unit;
+mod layout;
+mod time_field;
 
 use crate::RecordingError;
 use crate::message::no_returns::{NoReturnDetector, RangeLimits};
-use crate::message::scan::sort_by_firing_time;
-use crate::wire::{DecodeError, Decoder, Encoder, Payload};
-pub use fields::TimeField;
+use crate::message::point_times::RawCloud;
+use crate::wire::{DecodeError, Encoder, Payload};
 use fields::{FLOAT32, Field, UINT32};
-pub use time_unit::{CloudDuration, TimeUnit};
+use layout::Cloud;
+pub use time_field::TIME_NAMES;
 use zsim_base::measurement::{LidarReturn, LidarScan};
 use zsim_base::time::{Span, Stamp};
 
@@ -18,9 +19,6 @@ const POINT_STEP: usize = 20;
 
 /// Maximum number of points for which memory is reserved in advance.
 const MAX_PREALLOCATED: usize = 1 << 20;
-
-/// Maximum number of fields of a point.
-const MAX_FIELDS: usize = 256;
 
 /// Encodes the returns of the lidar in `frame`.
 ///
@@ -96,119 +94,41 @@ fn encode_layout(
     out.length(count * point_step)
 }
 
-/// Layout and data of a cloud.
-struct Cloud<'a> {
-    stamp: Stamp,
-    fields: Vec<Field<'a>>,
-    big_endian: bool,
-    width: usize,
-    point_step: usize,
-    row_step: usize,
-    data: &'a [u8],
-}
-
-impl<'a> Cloud<'a> {
-    fn decode(message: Payload<'a>) -> Result<Self, DecodeError> {
-        let mut input = Decoder::new(message)?;
-        let (stamp, _) = input.header()?;
-        let (height, width) = (input.u32()? as usize, input.u32()? as usize);
-        let count = input.u32()? as usize;
-        if count > MAX_FIELDS {
-            return Err(DecodeError::Contradiction("a cloud has more than 256 fields"));
-        }
-        let fields = (0..count)
-            .map(|_| {
-                let name = input.string()?;
-                let offset = input.u32()? as usize;
-                let kind = input.u8()?;
-                input.u32()?;
-                Ok(Field { name, offset, kind })
-            })
-            .collect::<Result<Vec<_>, DecodeError>>()?;
-        let big_endian = input.u8()? != 0;
-        let (point_step, row_step) = (input.u32()? as usize, input.u32()? as usize);
-        let data = input.bytes()?;
-        let row = width.checked_mul(point_step).ok_or(DecodeError::Short)?;
-        // Some writers omit the row length of a cloud with one row.
-        let row_step = if height == 1 { row } else { row_step };
-        let size = height.checked_mul(row_step).ok_or(DecodeError::Short)?;
-        if size > data.len() || row > row_step {
-            return Err(DecodeError::Contradiction("a cloud has less data than its width and height require"));
-        }
-        if fields.iter().any(|field| !field.fits(point_step)) {
-            return Err(DecodeError::Contradiction("a field of a cloud exceeds the size of a point"));
-        }
-        Ok(Self { stamp, fields, big_endian, width, point_step, row_step, data: &data[..size] })
-    }
-
-    fn field(&self, name: &str) -> Option<&Field<'a>> {
-        self.fields.iter().find(|field| field.name == name)
-    }
-
-    fn is_empty(&self) -> bool {
-        self.data.is_empty() || self.width == 0
-    }
-
-    fn coordinates(&self) -> Result<[&Field<'a>; 3], DecodeError> {
-        let coordinate = |name| self.field(name).ok_or(DecodeError::Contradiction("a cloud has no fields x, y and z"));
-        Ok([coordinate("x")?, coordinate("y")?, coordinate("z")?])
-    }
-
-    fn points(&self) -> impl Iterator<Item = &'a [u8]> {
-        let (row, step) = (self.width * self.point_step, self.point_step.max(1));
-        self.data.chunks_exact(self.row_step.max(1)).flat_map(move |bytes| bytes[..row].chunks_exact(step))
-    }
-}
-
-/// Decodes a cloud's returns in firing order.
+/// Decodes a cloud's returns, with their times as written.
 ///
-/// Points that are not finite, at the origin, or at `no_return_range_m` or farther are beams without a return. Their
-/// times after the stamp have the given `unit`; without one it is detected.
+/// Points that are not finite, at the origin, or at `no_return_range_m` or farther are beams without a return. The time field
+/// is that of the name number `source`; without it, the first that is not the same in all points, else the first.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2` with x, y and z.
 pub fn decode(
     message: Payload<'_>,
-    unit: Option<TimeUnit>,
+    source: Option<usize>,
     no_return_range_m: Option<f32>,
-) -> Result<LidarScan, DecodeError> {
+) -> Result<RawCloud, DecodeError> {
     let cloud = Cloud::decode(message)?;
+    let mut raw = RawCloud { stamp: cloud.stamp, ..RawCloud::default() };
     if cloud.is_empty() {
         // A cloud without points may also lack fields.
-        return Ok(LidarScan { stamp: cloud.stamp, stamped_after: Span::ZERO, returns: Vec::new(), planar: None });
+        return Ok(raw);
     }
     let [x, y, z] = cloud.coordinates()?;
-    let intensity = ["intensity", "intensities", "reflectivity", "i"].iter().find_map(|name| cloud.field(name));
-    let mut time = TimeField::find(&cloud.fields);
-    if let Some(time) = &mut time {
-        match unit {
-            Some(unit) => time.set_unit(unit),
-            None => time.detect_encoding(cloud.stamp, cloud.points(), cloud.big_endian),
-        }
-    }
+    let intensity =
+        ["intensity", "intensities", "reflectivity", "i"].iter().find_map(|name| cloud.readable_field(name));
+    let time = source.or_else(|| cloud.time_source()).and_then(|source| Some((source, cloud.time_field(source)?)));
+    (raw.source, raw.is_short) = time.map_or((0, false), |(source, field)| (source, field.is_short()));
     let limits = RangeLimits::new(0.0, 0.0, no_return_range_m);
-    let mut returns = Vec::with_capacity((cloud.data.len() / cloud.point_step.max(1)).min(MAX_PREALLOCATED));
+    raw.returns.reserve(cloud.count().min(MAX_PREALLOCATED));
     for bytes in cloud.points() {
         let number = |field: &Field<'_>| field.number(bytes, cloud.big_endian) as f32;
         let point_in_laser = nalgebra::Vector3::new(number(x), number(y), number(z));
-        if !limits.is_return(point_in_laser.norm()) {
-            continue;
+        if limits.is_return(point_in_laser.norm()) {
+            let intensity = intensity.map_or(0.0, number);
+            raw.returns.push(LidarReturn { offset: Span::ZERO, point_in_laser, intensity });
+            raw.times.extend(time.map(|(_, field)| field.number(bytes, cloud.big_endian)));
         }
-        let offset = match &time {
-            Some(time) => match time.offset(cloud.stamp, bytes, cloud.big_endian) {
-                Some(offset) => offset,
-                None => {
-                    return Err(DecodeError::Contradiction(
-                        "a point's time is not finite, or more than 60 s from its cloud's stamp",
-                    ));
-                }
-            },
-            None => Span::ZERO,
-        };
-        returns.push(LidarReturn { offset, point_in_laser, intensity: intensity.map_or(0.0, number) });
     }
-    let stamped_after = sort_by_firing_time(&mut returns);
-    Ok(LidarScan { stamp: cloud.stamp - stamped_after, stamped_after, returns, planar: None })
+    Ok(raw)
 }
 
 /// Counts the encodings of beams without a return in a cloud.
@@ -229,32 +149,18 @@ pub fn count_no_returns(message: Payload<'_>, detector: &mut NoReturnDetector) -
     Ok(())
 }
 
-/// Whether a cloud has no points.
-///
-/// # Errors
-/// When the bytes are not a `PointCloud2`, or the points have no x, y and z.
-pub fn is_empty(message: Payload<'_>) -> Result<bool, DecodeError> {
-    let cloud = Cloud::decode(message)?;
-    if cloud.is_empty() { Ok(true) } else { cloud.coordinates().map(|_| false) }
-}
-
-/// Whether a cloud's point times are on another clock than the stamp; `None` if it has no point times.
+/// Lists the fields of a cloud with their types, for messages.
 ///
 /// # Errors
 /// When the bytes are not a `PointCloud2`.
-pub fn has_other_clock(message: Payload<'_>) -> Result<Option<bool>, DecodeError> {
-    let cloud = Cloud::decode(message)?;
-    Ok(TimeField::find(&cloud.fields).map(|mut time| {
-        time.detect_encoding(cloud.stamp, cloud.points(), cloud.big_endian);
-        time.is_other_clock()
-    }))
+pub fn fields(message: Payload<'_>) -> Result<String, DecodeError> {
+    Ok(Cloud::decode(message)?.field_list())
 }
 
-/// Duration of a cloud from the point times; `None` if it has none, or they are absolute.
-pub fn duration(message: Payload<'_>) -> Option<CloudDuration> {
-    let cloud = Cloud::decode(message).ok()?;
-    let mut time = TimeField::find(&cloud.fields)?;
-    time.detect_encoding(cloud.stamp, cloud.points(), cloud.big_endian);
-    let (raw_spread, usual_s) = time.spread(cloud.points(), cloud.big_endian)?;
-    Some(CloudDuration { stamp: cloud.stamp, raw_spread, usual_s })
+/// Length of a row that a cloud states and that contradicts its width, height and data, bytes.
+///
+/// # Errors
+/// When the bytes are not a `PointCloud2`.
+pub fn wrong_row_step(message: Payload<'_>) -> Result<Option<usize>, DecodeError> {
+    Ok(Cloud::decode(message)?.wrong_row_step)
 }

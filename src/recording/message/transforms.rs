@@ -1,6 +1,7 @@
 //! `tf2_msgs/TFMessage`: transforms between frames.
 
 use crate::RecordingError;
+use crate::schema::MessageType;
 use crate::topics::printable;
 use crate::wire::{DecodeError, Decoder, Encoder, Payload};
 use zsim_base::geometry::Pose;
@@ -34,11 +35,27 @@ pub fn encode(out: &mut Encoder<'_>, stamp: Stamp, transforms: &[Transform]) -> 
     Ok(())
 }
 
-/// Decodes transforms.
+/// Transform as read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadTransform {
+    /// Name of the parent frame.
+    pub parent: String,
+    /// Name of the frame.
+    pub child: String,
+    /// `parent_from_child`, or why it is not a rigid transform.
+    pub parent_from_child: Result<Pose, DecodeError>,
+}
+
+/// Whether messages of the type `name` are transforms; tf 1 wrote the same message by another name.
+pub fn is_type(name: &str) -> bool {
+    MessageType::Transforms.is_named(name) || name == "tf/tfMessage" || name == "tf/msg/tfMessage"
+}
+
+/// Decodes transforms; one that is not rigid does not affect the others.
 ///
 /// # Errors
-/// When the bytes are not a `TFMessage`, or a transform is not rigid.
-pub fn decode(message: Payload<'_>) -> Result<Vec<Transform>, DecodeError> {
+/// When the bytes are not a `TFMessage`.
+pub fn decode(message: Payload<'_>) -> Result<Vec<ReadTransform>, DecodeError> {
     let mut input = Decoder::new(message)?;
     let count = input.u32()? as usize;
     if count > message.bytes.len() / MIN_BYTES {
@@ -49,7 +66,10 @@ pub fn decode(message: Payload<'_>) -> Result<Vec<Transform>, DecodeError> {
             let (_, parent) = input.header()?;
             let parent = printable_frame(parent);
             let child = printable_frame(input.string()?);
-            Ok(Transform { parent, child, parent_from_child: input.pose()? })
+            match input.pose() {
+                Err(DecodeError::Short) => Err(DecodeError::Short),
+                parent_from_child => Ok(ReadTransform { parent, child, parent_from_child }),
+            }
         })
         .collect()
 }
@@ -57,4 +77,10 @@ pub fn decode(message: Payload<'_>) -> Result<Vec<Transform>, DecodeError> {
 /// Printable name of a frame, without the leading slash of tf 1.
 pub fn printable_frame(frame: &str) -> String {
     printable(frame.trim_start_matches('/'))
+}
+
+/// Whether `frame`, as written, has the name `printable`.
+pub fn is_frame(frame: &str, printable: &str) -> bool {
+    // Most names are printable as they are.
+    frame.trim_start_matches('/') == printable || printable_frame(frame) == printable
 }

@@ -1,6 +1,9 @@
 //! Topics that may be the lidar or the IMU, judged by their first messages.
 
+use super::unused::UnusedTopic;
 use crate::container::{ChannelId, Messages, RawMessage};
+use crate::message::no_returns::RangeLimits;
+use crate::message::point_times::{CloudTimes, PointTimes};
 use crate::message::transforms::printable_frame;
 use crate::message::{imu, livox, multi_echo, points, scan};
 use crate::schema::MessageType;
@@ -46,7 +49,10 @@ pub struct Candidate {
     pub kind: Option<LidarKind>,
     /// Quality of the beam times.
     pub times: BeamTimes,
-    is_empty: bool,
+    /// Whether the message has no returns.
+    pub is_empty: bool,
+    /// Why the topic is not a sensor that an estimate can use, unless it is requested.
+    unsuitable: Option<&'static str>,
 }
 
 /// Topics with the message types of a sensor.
@@ -54,9 +60,15 @@ pub struct Candidate {
 pub struct Candidates {
     /// Topics whose messages can be decoded.
     pub found: Vec<Candidate>,
-    /// Topics that are not usable, with the reason, one clause each.
-    pub unusable: Vec<String>,
+    /// Topics that are not usable.
+    pub unusable: Vec<UnusedTopic>,
 }
+
+/// Maximum number of messages without returns after which a topic has none.
+const MAX_EMPTY: usize = 500;
+
+/// Parts of the names of a radar's fields.
+const RADAR_FIELDS: [&str; 4] = ["rcs", "doppler", "range_rate", "radial"];
 
 /// Decodes a message of a topic into a candidate.
 type Probe = fn(&RawMessage<'_>, MessageType, &str) -> Result<Candidate, DecodeError>;
@@ -93,7 +105,7 @@ impl Reader {
             CandidateSearch { remaining, probe, found: Vec::new(), empty: BTreeMap::new(), failed: BTreeMap::new() };
         search.run(self.messages_in_blocks_of(&ids))?;
         search.run(self.messages())?;
-        Ok(search.finish())
+        Ok(search.finish(requested.is_some()))
     }
 
     fn topic_error(&self, topic: &str, problem: String) -> RecordingError {
@@ -107,8 +119,8 @@ struct CandidateSearch<'a> {
     remaining: BTreeMap<ChannelId, (MessageType, &'a str)>,
     probe: Probe,
     found: Vec<Candidate>,
-    /// Topics whose messages have no points so far.
-    empty: BTreeMap<&'a str, Candidate>,
+    /// Topics whose messages have no returns so far, with the number of these messages.
+    empty: BTreeMap<&'a str, (Candidate, usize)>,
     /// Decoding error of the first message of a topic.
     failed: BTreeMap<&'a str, DecodeError>,
 }
@@ -120,11 +132,16 @@ impl CandidateSearch<'_> {
             let Some((kind, topic)) = self.remaining.get(&message.channel).copied() else { continue };
             match (self.probe)(&message, kind, topic) {
                 Ok(candidate) if candidate.is_empty => {
-                    self.empty.entry(topic).or_insert(candidate);
+                    let (_, count) = self.empty.entry(topic).or_insert((candidate, 0));
+                    *count += 1;
+                    if *count >= MAX_EMPTY {
+                        self.remaining.retain(|_, (_, other)| *other != topic);
+                    }
                 }
                 Ok(candidate) => {
                     // In a split recording a topic has one channel per file.
                     self.remaining.retain(|_, (_, other)| *other != topic);
+                    self.empty.remove(topic);
                     self.found.push(candidate);
                 }
                 Err(error) => {
@@ -135,22 +152,26 @@ impl CandidateSearch<'_> {
         Ok(())
     }
 
-    fn finish(mut self) -> Candidates {
+    /// Completes the search; topics that are not suitable are candidates only if they are `requested`.
+    fn finish(mut self, requested: bool) -> Candidates {
+        self.found.extend(self.empty.into_values().map(|(candidate, _)| candidate));
         let mut unusable = BTreeMap::new();
         for (kind, topic) in self.remaining.into_values() {
-            if let Some(candidate) = self.empty.remove(topic) {
-                self.found.push(candidate);
-                continue;
-            }
             let reason = match self.failed.get(topic) {
-                Some(error) => format!("topic {topic}: {error} in its first {} message", kind.name()),
-                None => format!("topic {topic} has no messages"),
+                Some(error) => format!("{error} in its first {} message", kind.name()),
+                None => "it has no messages".to_owned(),
             };
             if self.found.iter().all(|candidate| candidate.topic != topic) {
-                unusable.insert(topic, reason);
+                unusable.insert(topic.to_owned(), reason);
             }
         }
-        Candidates { found: self.found, unusable: unusable.into_values().collect() }
+        self.found.retain(|candidate| {
+            let reason = candidate.unsuitable.filter(|_| !requested);
+            unusable.extend(reason.map(|reason| (candidate.topic.clone(), reason.to_owned())));
+            reason.is_none()
+        });
+        let unusable = unusable.into_iter().map(|(topic, reason)| UnusedTopic { topic, reason });
+        Candidates { found: self.found, unusable: unusable.collect() }
     }
 }
 
@@ -171,16 +192,26 @@ pub fn probe_lidar(message: &RawMessage<'_>, kind: MessageType, topic: &str) -> 
             planar_properties(LidarKind::MultiEcho, &multi_echo::decode(message.data)?.1)
         }
         MessageType::PointCloud2 => {
-            let times = match points::has_other_clock(message.data)? {
-                Some(false) => BeamTimes::Stated,
-                Some(true) => BeamTimes::OtherClock,
-                None => BeamTimes::Unknown,
+            let cloud = points::decode(message.data, None, None)?;
+            let times = CloudTimes::of(&cloud).and_then(|times| PointTimes::detect(&[times]));
+            let times = match times {
+                Some((times, _)) if times.is_other_clock() => BeamTimes::OtherClock,
+                Some((PointTimes::Encoded { .. }, _)) => BeamTimes::Stated,
+                Some((PointTimes::AtStamp, _)) | None => BeamTimes::Unknown,
             };
-            (LidarKind::Points, times, points::is_empty(message.data)?)
+            (LidarKind::Points, times, cloud.returns.is_empty())
         }
         _ => (LidarKind::Livox, BeamTimes::Stated, livox::decode(message.data, None)?.returns.is_empty()),
     };
-    Ok(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times, is_empty })
+    let is_radar = kind == LidarKind::Points && times == BeamTimes::Unknown && has_radar_field(message);
+    let unsuitable = is_radar
+        .then_some("the fields of its clouds are those of a radar, whose returns are too few and too inaccurate");
+    Ok(Candidate { topic: topic.to_owned(), frame, kind: Some(kind), times, is_empty, unsuitable })
+}
+
+fn has_radar_field(message: &RawMessage<'_>) -> bool {
+    let fields = points::fields(message.data).unwrap_or_default().to_ascii_lowercase();
+    RADAR_FIELDS.iter().any(|part| fields.contains(part))
 }
 
 fn planar_properties(kind: LidarKind, scan: &zsim_base::measurement::PlanarScan) -> (LidarKind, BeamTimes, bool) {
@@ -189,7 +220,8 @@ fn planar_properties(kind: LidarKind, scan: &zsim_base::measurement::PlanarScan)
         (true, false) => BeamTimes::Implied,
         (true, true) => BeamTimes::Unknown,
     };
-    (kind, times, scan.ranges_m.is_empty())
+    let limits = RangeLimits::new(scan.range_min_m, scan.range_max_m, None);
+    (kind, times, !scan.ranges_m.iter().any(|range| limits.is_return(*range)))
 }
 
 /// Decodes an IMU message into a candidate.
@@ -199,5 +231,12 @@ fn planar_properties(kind: LidarKind, scan: &zsim_base::measurement::PlanarScan)
 pub fn probe_imu(message: &RawMessage<'_>, _: MessageType, topic: &str) -> Result<Candidate, DecodeError> {
     imu::decode(message.data, imu::ForceUnit::default())?;
     let frame = frame_of(message)?;
-    Ok(Candidate { topic: topic.to_owned(), frame, kind: None, times: BeamTimes::Stated, is_empty: false })
+    Ok(Candidate {
+        topic: topic.to_owned(),
+        frame,
+        kind: None,
+        times: BeamTimes::Stated,
+        is_empty: false,
+        unsuitable: None,
+    })
 }

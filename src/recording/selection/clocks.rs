@@ -1,6 +1,6 @@
 //! Detects different epochs of the lidar's and IMU's clocks from log times.
 
-use super::content::quantile;
+use crate::quantile::quantile;
 use zsim_base::time::{Span, Stamp};
 
 /// Smallest offset that is corrected here, s; the estimator determines smaller ones more accurately.

@@ -3,6 +3,7 @@
 //! The content is acceleration, angular velocity or both, the unit of acceleration, and whether gravity is included.
 
 use crate::message::imu::ForceUnit;
+use crate::quantile::quantile;
 use zsim_base::measurement::{ImuSample, ONE_G_RANGE};
 
 /// Minimum number of samples for a decision.
@@ -61,13 +62,6 @@ impl Content {
 
 fn is_constant(samples: &[ImuSample]) -> bool {
     samples.windows(2).all(|pair| pair[0].specific_force_m_per_s2 == pair[1].specific_force_m_per_s2)
-}
-
-/// The `fraction` quantile of `values`.
-pub fn quantile(mut values: Vec<f64>, fraction: f64) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    let at = (fraction * values.len().saturating_sub(1) as f64).round() as usize;
-    values.get(at).copied().unwrap_or_default()
 }
 
 /// Detects the unit of specific force; `None` if gravity is not included.

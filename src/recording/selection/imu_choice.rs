@@ -1,9 +1,11 @@
 //! Selects the IMU topic and determines how messages form samples.
 
 use super::candidates::Candidate;
-use super::content::{Content, detect_unit, quantile};
+use super::content::{Content, detect_unit};
 use super::preview::ImuPreview;
+use super::unused::UnusedTopic;
 use crate::message::imu::ForceUnit;
+use crate::quantile::quantile;
 use crate::{Reader, RecordingError};
 use std::collections::BTreeMap;
 use zsim_base::measurement::ImuSample;
@@ -36,6 +38,8 @@ pub struct ImuChoice {
     pub layout: ImuLayout,
     pub unit: ForceUnit,
     pub preview: ImuPreview,
+    /// The other topics.
+    pub unused: Vec<UnusedTopic>,
 }
 
 fn has_force(sample: &ImuSample) -> bool {
@@ -95,7 +99,12 @@ impl Reader {
         };
         let unit = self.acceleration_unit(forces, &previews)?;
         let preview = previews.get(&rates.topic).cloned().unwrap_or_default();
-        Ok(Some(ImuChoice { candidate: rates.clone(), layout, unit, preview }))
+        let others = all.iter().filter(|c| c.topic != rates.topic && c.topic != forces.topic);
+        let unused = others.map(|other| {
+            let reason = reason_against(other, content(other), rates);
+            UnusedTopic { topic: other.topic.clone(), reason }
+        });
+        Ok(Some(ImuChoice { candidate: rates.clone(), layout, unit, preview, unused: unused.collect() }))
     }
 
     /// Determines how separate messages are paired.
@@ -106,9 +115,9 @@ impl Reader {
         previews: &BTreeMap<String, ImuPreview>,
     ) -> Result<ImuLayout, RecordingError> {
         let angle_rad = self
-            .frame_tree()
+            .frames()
             .ok()
-            .and_then(|tree| tree.target_from_source(&rates.frame, &forces.frame))
+            .and_then(|frames| frames.target_from_source(&rates.frame, &forces.frame).ok().flatten())
             .map_or(0.0, |pose| pose.rotation.angle());
         if angle_rad > MAX_AXES_ANGLE_RAD {
             let problem = format!(
@@ -158,6 +167,22 @@ impl Reader {
 
     fn imu_error(&self, candidate: &Candidate, problem: String) -> RecordingError {
         RecordingError::Imu { name: self.name().to_owned(), topic: candidate.topic.clone(), problem }
+    }
+}
+
+/// Why `other` is not used, but `chosen`.
+fn reason_against(other: &Candidate, content: Content, chosen: &Candidate) -> String {
+    let frame = &other.frame;
+    match content {
+        Content::Neither => "it has zeros for acceleration and angular velocity".to_owned(),
+        Content::RateOnly => "it has zeros for acceleration".to_owned(),
+        Content::ForceOnly => "it has zeros for angular velocity".to_owned(),
+        Content::Alternating => "it has zeros for acceleration or angular velocity in each message".to_owned(),
+        Content::Both if other.frame == chosen.frame && name_rank(&other.topic) > name_rank(&chosen.topic) => {
+            format!("the same IMU (frame {frame}); raw data are preferred")
+        }
+        Content::Both if other.frame == chosen.frame => format!("the same IMU (frame {frame}), as suitable"),
+        Content::Both => format!("another IMU (frame {frame}), as suitable; select it with --imu-topic"),
     }
 }
 

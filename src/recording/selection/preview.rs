@@ -1,9 +1,11 @@
 //! First seconds of a recording, from which units, content and clocks are detected.
 
 use super::clocks::LogTimes;
-use super::content::quantile;
 use crate::container::{ChannelId, RawMessage};
 use crate::message::imu::{self, ForceUnit};
+use crate::message::transforms::{is_frame, printable_frame};
+use crate::quantile::quantile;
+use crate::topics::shortened;
 use crate::wire::Decoder;
 use crate::{Reader, RecordingError};
 use std::collections::BTreeMap;
@@ -16,6 +18,9 @@ const PREVIEW_S: f64 = 12.0;
 /// Maximum number of messages in the preview: bounds the memory.
 const MAX_MESSAGES: usize = 60_000;
 
+/// Maximum number of frames on one topic that are distinguished.
+const MAX_FRAMES: usize = 8;
+
 /// First messages of an IMU topic, with accelerations in the unit of the file.
 #[derive(Debug, Clone, Default)]
 pub struct ImuPreview {
@@ -23,6 +28,47 @@ pub struct ImuPreview {
     pub samples: Vec<ImuSample>,
     /// Log times of the samples.
     pub log_times: LogTimes,
+    /// Frames of the samples.
+    pub frames: FrameCounts,
+}
+
+/// Headers of the first messages of a lidar.
+#[derive(Debug, Clone, Default)]
+pub struct HeaderPreview {
+    /// Log times and stamps.
+    pub log_times: LogTimes,
+    /// Frames of the messages.
+    pub frames: FrameCounts,
+}
+
+/// Number of messages of each frame on a topic, in the order in which the frames appear.
+#[derive(Debug, Clone, Default)]
+pub struct FrameCounts(Vec<(String, usize)>);
+
+impl FrameCounts {
+    /// Counts a message.
+    fn add(&mut self, frame: &str) {
+        if let Some((_, count)) = self.0.iter_mut().find(|(known, _)| is_frame(frame, known)) {
+            *count += 1;
+        } else if self.0.len() < MAX_FRAMES {
+            self.0.push((printable_frame(frame), 1));
+        }
+    }
+
+    /// The frame of most messages; of several the first.
+    pub fn main(&self) -> Option<&str> {
+        self.0.iter().rev().max_by_key(|(_, count)| *count).map(|(frame, _)| frame.as_str())
+    }
+
+    /// Reports several frames on a topic.
+    pub fn note(&self, topic: &str) -> Option<String> {
+        let main = self.main()?;
+        let others: Vec<_> = self.0.iter().map(|(frame, _)| frame.as_str()).filter(|frame| *frame != main).collect();
+        (!others.is_empty()).then(|| {
+            let (main, others) = (shortened(main), others.into_iter().map(shortened).collect::<Vec<_>>().join(", "));
+            format!("{topic} has messages of several frames: those of {main} are used, not those of {others}.")
+        })
+    }
 }
 
 impl ImuPreview {
@@ -74,22 +120,27 @@ impl Reader {
                 let preview = previews.entry((*topic).to_owned()).or_default();
                 preview.samples.push(sample);
                 preview.log_times.pairs.push((log, sample.stamp));
+                if let Ok((_, frame)) = Decoder::new(message.data).and_then(|mut input| input.header()) {
+                    preview.frames.add(frame);
+                }
             }
         })?;
         previews.values_mut().for_each(|preview| preview.samples.sort_by_key(|sample| sample.stamp));
         Ok(previews)
     }
 
-    /// Reads log times and header stamps of the first messages of a lidar.
+    /// Reads the headers of the first messages of a lidar.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn log_times(&self, topic: &str) -> Result<LogTimes, RecordingError> {
-        let mut log_times = LogTimes::default();
+    pub fn preview_headers(&self, topic: &str) -> Result<HeaderPreview, RecordingError> {
+        let mut preview = HeaderPreview::default();
         self.for_first_messages(&self.ids_of(topic), |message, log| {
-            let header = Decoder::new(message.data).and_then(|mut input| input.header());
-            log_times.pairs.extend(header.ok().map(|(stamp, _)| (log, stamp)));
+            if let Ok((stamp, frame)) = Decoder::new(message.data).and_then(|mut input| input.header()) {
+                preview.log_times.pairs.push((log, stamp));
+                preview.frames.add(frame);
+            }
         })?;
-        Ok(log_times)
+        Ok(preview)
     }
 }

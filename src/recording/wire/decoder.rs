@@ -39,7 +39,7 @@ impl<'a> Payload<'a> {
 }
 
 /// Reason why a message cannot be decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// The encapsulation header is not that of plain CDR.
     #[error("not plain CDR")]
@@ -55,6 +55,16 @@ pub enum DecodeError {
     NotFinite {
         /// Name of the field.
         field: &'static str,
+    },
+    /// A field of a cloud's points that is needed cannot be read.
+    #[error("field {name} ({datatype}) {problem}")]
+    Field {
+        /// Name of the field.
+        name: String,
+        /// Type of the field.
+        datatype: String,
+        /// Description of the problem.
+        problem: &'static str,
     },
     /// Lengths or fields are inconsistent.
     #[error("{0}")]
@@ -204,11 +214,19 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// When the message is truncated, or the frame is not UTF-8.
     pub fn header(&mut self) -> Result<(Stamp, &'a str), DecodeError> {
+        let stamp = self.header_stamp()?;
+        Ok((stamp, self.string()?))
+    }
+
+    /// Reads the stamp of a `std_msgs/Header`, which in ROS 1 follows a sequence number.
+    ///
+    /// # Errors
+    /// When the message is truncated.
+    pub fn header_stamp(&mut self) -> Result<Stamp, DecodeError> {
         if self.wire == WireFormat::Ros1 {
             self.u32()?;
         }
-        let stamp = self.time()?;
-        Ok((stamp, self.string()?))
+        self.time()
     }
 
     /// Reads a `geometry_msgs/Vector3` (or `Point`).
@@ -230,8 +248,11 @@ impl<'a> Decoder<'a> {
         let [x, y, z, w] = self.f64s::<4>()?;
         let quaternion = nalgebra::Quaternion::new(w, x, y, z);
         let off = (quaternion.norm_squared() - 1.0).abs();
-        if !position.iter().all(|c| c.is_finite()) || !off.is_finite() || off > 1e-2 {
-            return Err(DecodeError::Contradiction("a pose is not finite, or its quaternion is not a unit quaternion"));
+        if !position.iter().all(|c| c.is_finite()) || !off.is_finite() {
+            return Err(DecodeError::Contradiction("a number of the pose is NaN or infinite"));
+        }
+        if off > 1e-2 {
+            return Err(DecodeError::Contradiction("the quaternion of the pose is not of norm 1"));
         }
         let rotation =
             if off < 1e-12 { Rotation::new_unchecked(quaternion) } else { Rotation::from_quaternion(quaternion) };

@@ -1,8 +1,10 @@
 //! Conventions of drivers: beams without a return, split IMU messages, clocks, point times, duplicates.
 
 mod imu;
+mod layouts;
 mod misses;
 mod points;
+mod wild_times;
 
 use crate::recording::foreign::{self, Foreign, IMU, LaserScan, PointCloud2, PointField, SCAN, header, imu, select};
 

@@ -121,20 +121,20 @@ fn point_times_of_all_drivers_are_read() {
 }
 
 #[derive(Serialize)]
-struct CustomPoint {
-    offset_time: u32,
-    xyz: [f32; 3],
-    reflectivity_tag_line: [u8; 3],
+pub(super) struct CustomPoint {
+    pub offset_time: u32,
+    pub xyz: [f32; 3],
+    pub reflectivity_tag_line: [u8; 3],
 }
 
 #[derive(Serialize)]
-struct CustomMsg {
-    header: Header,
-    timebase: u64,
-    point_num: u32,
-    lidar_id: u8,
-    rsvd: [u8; 3],
-    points: Vec<CustomPoint>,
+pub(super) struct CustomMsg {
+    pub header: Header,
+    pub timebase: u64,
+    pub point_num: u32,
+    pub lidar_id: u8,
+    pub rsvd: [u8; 3],
+    pub points: Vec<CustomPoint>,
 }
 
 #[test]

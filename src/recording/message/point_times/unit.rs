@@ -1,6 +1,8 @@
 //! Detects the unit of point times if a lidar's clouds contradict the usual one.
 
-use zsim_base::time::{NANOS_PER_SECOND, Stamp};
+use super::CloudTimes;
+use crate::quantile::quantile;
+use zsim_base::time::NANOS_PER_SECOND;
 
 /// Minimum number of clouds for a decision.
 const MIN_CLOUDS: usize = 5;
@@ -38,55 +40,51 @@ impl TimeUnit {
         }
     }
 
-    /// Detects the unit from the first clouds of a lidar.
+    /// Detects the unit of times after the stamp from the first clouds of a lidar.
     ///
-    /// `None` if the usual unit gives a plausible ratio of duration to period, or no other unit gives a typical one.
-    pub fn detect(clouds: &[CloudDuration]) -> Option<Self> {
-        let mut periods_s: Vec<f64> =
-            clouds.windows(2).map(|pair| (pair[1].stamp - pair[0].stamp).seconds()).filter(|s| *s > 0.0).collect();
-        if periods_s.len() + 1 < MIN_CLOUDS {
+    /// `None` if the `usual` unit gives a plausible ratio of duration to period, or no other unit gives a typical one.
+    pub fn detect(clouds: &[CloudTimes], usual: Self) -> Option<Self> {
+        if clouds.len() < MIN_CLOUDS {
             return None;
         }
-        periods_s.sort_unstable_by(f64::total_cmp);
-        let period_s = periods_s[periods_s.len() / 2];
-        let longest = |of: fn(&CloudDuration) -> f64| clouds.iter().map(of).fold(0.0, f64::max);
-        let (raw_spread, usual_s) = (longest(|cloud| cloud.raw_spread), longest(|cloud| cloud.usual_s));
-        let ratio = |unit: &Self| raw_spread / unit.per_second() / period_s;
-        if PLAUSIBLE_RATIOS.contains(&(usual_s / period_s)) {
+        let period_s = period_s(clouds)?;
+        let longest = clouds.iter().map(CloudTimes::spread).fold(0.0, f64::max);
+        let ratio = |unit: &Self| longest / unit.per_second() / period_s;
+        if PLAUSIBLE_RATIOS.contains(&ratio(&usual)) {
             return None;
         }
         Self::ALL.into_iter().find(|unit| TYPICAL_RATIOS.contains(&ratio(unit)))
     }
 }
 
-/// Duration of a cloud.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CloudDuration {
-    /// Stamp of the cloud.
-    pub stamp: Stamp,
-    /// Spread of the point times, as written.
-    pub raw_spread: f64,
-    /// Spread of the point times in the usual unit, s.
-    pub usual_s: f64,
+/// Median interval of the clouds' stamps, s; `None` if no stamp is later than its predecessor.
+pub fn period_s(clouds: &[CloudTimes]) -> Option<f64> {
+    let intervals_s = clouds.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp));
+    let periods_s: Vec<f64> = intervals_s.filter(|s| *s > 0.0).collect();
+    (!periods_s.is_empty()).then(|| quantile(periods_s, 0.5))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use zsim_base::time::Stamp;
 
-    /// Clouds at 10 Hz with the given spread of point times, whose usual unit is `unit`.
-    fn clouds(raw_spread: &[f64], unit: TimeUnit) -> Vec<CloudDuration> {
-        let cloud = |(k, raw_spread): (usize, &f64)| CloudDuration {
+    /// Clouds at 10 Hz with the given spread of point times.
+    fn clouds(spreads: &[f64]) -> Vec<CloudTimes> {
+        let cloud = |(k, spread): (usize, &f64)| CloudTimes {
             stamp: Stamp::from_nanos(k as i64 * 100_000_000),
-            raw_spread: *raw_spread,
-            usual_s: raw_spread / unit.per_second(),
+            source: 0,
+            is_short: true,
+            low: 0.1 * spread,
+            high: 0.9 * spread,
+            is_equal: Some(*spread == 0.0),
         };
-        raw_spread.iter().enumerate().map(cloud).collect()
+        spreads.iter().enumerate().map(cloud).collect()
     }
 
     #[test]
     fn the_unit_is_detected_from_the_duration_of_clouds() {
-        let unit = |raw_spread: f64, usual| TimeUnit::detect(&clouds(&[raw_spread; 8], usual)).map(TimeUnit::name);
+        let unit = |raw_spread: f64, usual| TimeUnit::detect(&clouds(&[raw_spread; 8]), usual).map(TimeUnit::name);
         assert_eq!(unit(99.9e6, TimeUnit::NANOSECOND), None);
         assert_eq!(unit(99.9e3, TimeUnit::NANOSECOND), Some("microseconds"));
         assert_eq!(unit(99.9, TimeUnit::NANOSECOND), Some("milliseconds"));
@@ -95,7 +93,7 @@ mod tests {
         // All points at once; few points, but more in some clouds; too few clouds.
         assert_eq!(unit(0.0, TimeUnit::NANOSECOND), None);
         assert_eq!(unit(0.5e6, TimeUnit::NANOSECOND), None);
-        assert_eq!(TimeUnit::detect(&clouds(&[1e4, 2e4, 5e5, 0.0, 1e3], TimeUnit::NANOSECOND)), None);
-        assert_eq!(TimeUnit::detect(&clouds(&[99.9e3; 4], TimeUnit::NANOSECOND)), None);
+        assert_eq!(TimeUnit::detect(&clouds(&[1e4, 2e4, 5e5, 0.0, 1e3]), TimeUnit::NANOSECOND), None);
+        assert_eq!(TimeUnit::detect(&clouds(&[99.9e3; 4]), TimeUnit::NANOSECOND), None);
     }
 }
