@@ -1,6 +1,7 @@
 //! `zsim info`: the contents of a recording.
 
 use super::arguments::Global;
+use super::outlook::Outlook;
 use super::{Completion, message, output, quantity};
 use clap::Args;
 use std::path::PathBuf;
@@ -8,7 +9,7 @@ use zsim_base::printable::printable_name;
 use zsim_base::time::Span;
 use zsim_recording::{Reader, RecordingInfo, TopicInfo};
 
-/// Summarise a recording: topics, rates, gaps, clocks, and losses
+/// Summarise a recording: topics, rates, gaps, clocks, losses, and what `zsim estimate` would do with it
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim info recording.mcap")]
 pub(super) struct Arguments {
@@ -23,7 +24,12 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let reader = Reader::open(&arguments.recording)?;
     let info = reader.info(Span::from_seconds(arguments.gap))?;
-    output::print_result(global, &text(&info), serde_json::to_value(&info)?, None)?;
+    let outlook = Outlook::new(&reader, &info)?;
+    let mut json = serde_json::to_value(&info)?;
+    if let Some(object) = json.as_object_mut() {
+        object.insert("estimate".to_owned(), serde_json::to_value(&outlook)?);
+    }
+    output::print_result(global, &format!("{}\n{}", text(&info), outlook.text()), json, None)?;
     if info.loss.is_none() {
         return Ok(Completion::Done);
     }

@@ -29,6 +29,7 @@ mod live;
 mod man;
 mod map;
 mod message;
+mod outlook;
 mod output;
 mod quantity;
 mod recording_files;

@@ -8,6 +8,7 @@ mod examples;
 mod gains;
 mod hostile;
 mod hosts;
+mod info;
 mod live;
 mod live_run;
 mod maps;

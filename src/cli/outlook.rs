@@ -1,0 +1,116 @@
+//! What `zsim estimate` would do with a recording.
+
+use serde::Serialize;
+use zsim_estimation::EstimatorSpec;
+use zsim_recording::{Reader, RecordingInfo, Selection, TopicInfo, TopicPreference, UnusedTopic};
+use zsim_report::wrapped;
+use zsim_study::{CalibrationSpec, recording_calibration};
+
+/// What an estimate without options would do with a recording.
+#[derive(Debug, Serialize)]
+pub(super) struct Outlook {
+    /// The lidar that is used.
+    lidar: Option<Sensor>,
+    /// The IMU that is used.
+    imu: Option<Sensor>,
+    /// Other topics of these sensors.
+    unused: Vec<UnusedTopic>,
+    /// Notes on the sensors.
+    notes: Vec<String>,
+    /// Why the recording is refused, and the remedy; `None` if it is not.
+    refused: Option<String>,
+}
+
+/// Topic and frame of a sensor.
+#[derive(Debug, Serialize)]
+struct Sensor {
+    topic: String,
+    frame: String,
+}
+
+impl Outlook {
+    /// Selects the sensors of `reader`, whose summary is `info`.
+    pub fn new(reader: &Reader, info: &RecordingInfo) -> anyhow::Result<Self> {
+        let selection = match reader.select(&TopicPreference::default()) {
+            Ok(selection) => selection,
+            Err(error) => {
+                let (unused, notes, refused) = (Vec::new(), Vec::new(), Some(error.to_string()));
+                return Ok(Self { lidar: None, imu: None, unused, notes, refused });
+            }
+        };
+        let calibration = recording_calibration(reader, &selection, &CalibrationSpec::default());
+        let mut notes = selection.notes.clone();
+        let refused = match &calibration {
+            Ok(found) => {
+                notes.extend(found.notes.iter().cloned());
+                if !found.from_recording {
+                    notes.push(
+                        "No transforms join lidar and IMU: they are assumed to coincide and to have the same axes; pass the \
+                         extrinsics with --calibration."
+                            .to_owned(),
+                    );
+                }
+                let needed_s = zsim_estimation::load("default").map(|spec: EstimatorSpec| 2.0 * spec.step_s)?;
+                too_short(info, &selection, needed_s)
+            }
+            Err(error) => Some(error.to_string()),
+        };
+        let Selection { lidar_topic, lidar_frame, imu_topic, imu_frame, unused, .. } = selection;
+        let lidar = Some(Sensor { topic: lidar_topic, frame: lidar_frame });
+        let imu = Some(Sensor { topic: imu_topic, frame: imu_frame });
+        Ok(Self { lidar, imu, unused, notes, refused })
+    }
+
+    /// The sensors, the notes, and a last line that states whether the recording can be used.
+    pub fn text(&self) -> String {
+        let sensor = |name: &str, sensor: &Option<Sensor>| {
+            sensor.as_ref().map(|Sensor { topic, frame }| format!("{name}: {topic}, frame {frame}"))
+        };
+        let unused = self.unused.iter().map(|unused| format!("not used: {unused}"));
+        // Unusable topics are also in the list above.
+        let notes =
+            self.notes.iter().filter(|note| !note.starts_with("Not used: topic")).map(|note| format!("note: {note}"));
+        let end = match &self.refused {
+            Some(problem) => format!("zsim estimate: refused: {problem}"),
+            None => "zsim estimate: ready".to_owned(),
+        };
+        let sensors = sensor("lidar", &self.lidar).into_iter().chain(sensor("IMU", &self.imu));
+        sensors.chain(unused).chain(notes).chain([end]).map(|line| wrapped(&cut(&line), "  ")).collect()
+    }
+}
+
+/// Maximum length of a word, characters: longer names are cut.
+const MAX_WORD: usize = 200;
+
+/// Cuts the words of a line that are too long.
+fn cut(line: &str) -> String {
+    let words = line.split(' ').map(|word| match word.char_indices().nth(MAX_WORD) {
+        Some((end, _)) => format!("{}\u{2026}", &word[..end]),
+        None => word.to_owned(),
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// Why the sensors have too little time in common, by the stamps of their first and last messages.
+fn too_short(info: &RecordingInfo, selection: &Selection, needed_s: f64) -> Option<String> {
+    let topic = |name: &str| info.topics.iter().find(|topic| topic.topic == name);
+    let (lidar, imu) = (topic(&selection.lidar_topic)?, topic(&selection.imu_topic)?);
+    // Too few messages have no clock: the log times then decide.
+    let offsets_s = lidar.clock.zip(imu.clock).map_or((0.0, 0.0), |(lidar, imu)| (lidar.offset_s, imu.offset_s));
+    let imu_offset_s = offsets_s.1 + if offsets_s == (0.0, 0.0) { 0.0 } else { selection.imu_shift().seconds() };
+    let (lidar, imu) = (span_s(lidar, offsets_s.0)?, span_s(imu, imu_offset_s)?);
+    let common_s = (lidar.1.min(imu.1) - lidar.0.max(imu.0)).max(0.0);
+    (common_s < needed_s).then(|| {
+        format!(
+            "{} and {} have {common_s:.1} s in common; at least {needed_s:.1} s are needed: record both sensors at the same time, with \
+             synchronised clocks",
+            selection.lidar_topic, selection.imu_topic
+        )
+    })
+}
+
+/// Stamps of the first and the last message of a topic, s; clock and log time differ by `offset_s`.
+fn span_s(topic: &TopicInfo, offset_s: f64) -> Option<(f64, f64)> {
+    let stamp_s = |log_ns: i64| log_ns as f64 * 1e-9 + offset_s;
+    Some((stamp_s(topic.first_log_ns?), stamp_s(topic.last_log_ns?)))
+}
