@@ -7,7 +7,7 @@ use clap::Args;
 use std::path::PathBuf;
 use zsim_base::printable::printable_name;
 use zsim_base::time::Span;
-use zsim_recording::{Reader, RecordingInfo, TopicInfo};
+use zsim_recording::{ClockStep, Reader, RecordingInfo, TopicInfo};
 
 /// Summarise a recording: topics, rates, gaps, clocks, losses, and what `zsim estimate` would do with it
 #[derive(Args)]
@@ -30,6 +30,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         object.insert("estimate".to_owned(), serde_json::to_value(&outlook)?);
     }
     output::print_result(global, &format!("{}\n{}", text(&info), outlook.text()), json, None)?;
+    let steps = ClockStep::sentence(&info.loss.clock_steps);
+    info.loss.notes().iter().chain(&steps).for_each(|note| message::note(note));
     if info.loss.is_none() {
         return Ok(Completion::Done);
     }

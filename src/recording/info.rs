@@ -7,6 +7,7 @@ pub use clock::ClockStatistics;
 
 use crate::container::{Channel, ChannelId, RawMessage};
 use crate::message::transforms;
+use crate::stamp_screen::StampScreen;
 use crate::wire::Decoder;
 use crate::{Loss, Reader, RecordingError};
 use clock::ClockFit;
@@ -71,13 +72,28 @@ struct TopicAccumulator {
     messages: u64,
     first: Option<Stamp>,
     last: Option<Stamp>,
+    screen: StampScreen<(Stamp, Stamp)>,
+    stamps: StampStatistics,
+}
+
+/// Statistics of the stamps that are not outliers, without steps of the clock.
+#[derive(Default)]
+struct StampStatistics {
     intervals: Intervals,
     clock: Option<ClockFit>,
 }
 
+impl StampStatistics {
+    fn add(&mut self, log: Stamp, stamp: Stamp, gap: Span) {
+        self.intervals.add(stamp, gap);
+        self.clock.get_or_insert_with(|| ClockFit::starting(log, stamp)).add(log, stamp);
+    }
+}
+
 impl TopicAccumulator {
     fn new() -> Self {
-        Self { messages: 0, first: None, last: None, intervals: Intervals::default(), clock: None }
+        let (screen, stamps) = (StampScreen::default(), StampStatistics::default());
+        Self { messages: 0, first: None, last: None, screen, stamps }
     }
 
     /// Counts a message. Intervals are between stamps if there are any, because log times are bunched.
@@ -86,11 +102,20 @@ impl TopicAccumulator {
         self.messages += 1;
         self.first = Some(self.first.unwrap_or(log));
         self.last = Some(log);
-        let stamp = stamp_of(message, channel);
-        self.intervals.add(stamp.unwrap_or(log), gap);
-        if let Some(stamp) = stamp {
-            self.clock.get_or_insert_with(|| ClockFit::starting(log, stamp)).add(log, stamp);
+        match stamp_of(message, channel) {
+            Some(stamp) => {
+                let accept = &mut |(log, stamp), shift| self.stamps.add(log, stamp - shift, gap);
+                self.screen.push((log, stamp), (log, stamp), None, accept);
+            }
+            None => self.stamps.intervals.add(log, gap),
         }
+    }
+
+    /// Adds the last stamps, and counts outliers and steps of the clock in `loss`.
+    fn finish(&mut self, topic: &str, gap: Span, loss: &mut Loss) {
+        self.screen.finish(&mut |(log, stamp), shift| self.stamps.add(log, stamp - shift, gap));
+        loss.outlying_stamps += self.screen.outliers;
+        loss.clock_steps.extend(self.screen.clock_steps(topic, Span::ZERO));
     }
 }
 
@@ -119,6 +144,10 @@ impl Reader {
             }
         }
         loss.add_pass(&messages, self.expected_messages());
+        for channel in self.channels() {
+            let topic = accumulators.get_mut(&channel.id);
+            topic.into_iter().for_each(|topic| topic.finish(&channel.topic, gap, &mut loss));
+        }
         let first = accumulators.values().filter_map(|topic| topic.first).min();
         let last = accumulators.values().filter_map(|topic| topic.last).max();
         let mut topics: Vec<_> =
@@ -137,7 +166,8 @@ impl Reader {
 }
 
 fn topic_info(channel: &Channel, accumulator: TopicAccumulator) -> TopicInfo {
-    let intervals = accumulator.intervals.finish();
+    let StampStatistics { intervals, clock } = accumulator.stamps;
+    let intervals = intervals.finish();
     TopicInfo {
         topic: channel.topic.clone(),
         type_name: channel.type_name.clone(),
@@ -151,7 +181,7 @@ fn topic_info(channel: &Channel, accumulator: TopicAccumulator) -> TopicInfo {
         gaps: intervals.gaps,
         missing: intervals.missing,
         out_of_order: intervals.out_of_order,
-        clock: accumulator.clock.and_then(|fit| fit.statistics()),
+        clock: clock.and_then(|fit| fit.statistics()),
     }
 }
 

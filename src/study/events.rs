@@ -1,13 +1,9 @@
 //! Losses and notes of a run: one entry for each kind, with count, first and last time, and the worst case.
 
-use std::collections::BTreeSet;
 use zsim_base::time::Stamp;
 use zsim_estimation::{Discarded, Warning, WarningKind};
 use zsim_recording::ClockStep;
 use zsim_report::EventMetrics;
-
-/// Steps of two sensors that differ by less are of one clock, s.
-const SAME_STEP_S: f64 = 0.05;
 
 /// Losses and notes of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,22 +27,15 @@ impl Events {
 
     /// Adds a note on the steps of the sensors' clocks, with times relative to `start`.
     pub fn add_clock_steps(&mut self, steps: &[ClockStep], start: Stamp) {
-        let size = |step: &ClockStep| step.by.nanos().unsigned_abs();
-        let Some(worst) = steps.iter().max_by_key(|step| size(step)) else { return };
-        let is_same = |step: &&ClockStep| (step.by - worst.by).seconds().abs() < SAME_STEP_S;
-        let topics: BTreeSet<&str> = steps.iter().filter(is_same).map(|step| step.topic.as_str()).collect();
-        let topics = topics.into_iter().collect::<Vec<_>>().join(" and ");
-        let by_s = worst.by.seconds();
+        let (Some(largest), Some(sentence)) = (ClockStep::largest(steps), ClockStep::sentence(steps)) else { return };
         let times_s = || steps.iter().map(|step| step.at.seconds_since(start));
         self.notes.push(EventMetrics {
             kind: "clock_step".to_owned(),
             count: steps.len() as u64,
             first_s: times_s().min_by(f64::total_cmp),
             last_s: times_s().max_by(f64::total_cmp),
-            worst: Some(by_s.abs()),
-            sentence: format!(
-                "the clock of {topics} steps by {by_s:+.3} s, by log times; later stamps are read without it"
-            ),
+            worst: Some(largest.by.seconds().abs()),
+            sentence,
         });
     }
 
