@@ -4,7 +4,7 @@
 //! The folder that the user names may itself be a link. A link inside it was not made by zsim, and what it points to does
 //! not belong to the results.
 
-use std::fs::File;
+use std::fs::{File, FileType};
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Component, Path, PathBuf};
 
@@ -19,15 +19,37 @@ pub fn create(path: &Path) -> Result<File> {
     File::create(path)
 }
 
-/// Opens a file for reading.
+/// Opens the file at `path` for reading, if it is a regular file or a link to one.
+///
+/// Opening a FIFO waits for a writer, and devices have no end.
 ///
 /// # Errors
-/// When it cannot be opened, or is a folder, a device or a pipe, which could be read without end.
+/// When there is no regular file at `path`, or it cannot be opened.
 pub fn open(path: &Path) -> Result<File> {
-    match std::fs::metadata(path)?.is_file() {
-        true => File::open(path),
-        false => Err(Error::new(ErrorKind::InvalidInput, "is not a regular file")),
+    let kind = std::fs::metadata(path)?.file_type();
+    if kind.is_file() {
+        return File::open(path);
     }
+    let found = kind_name(kind);
+    Err(Error::new(ErrorKind::InvalidInput, format!("is {found}, not a regular file; specify a file on disk")))
+}
+
+/// Name of a kind of file, with its article.
+fn kind_name(kind: FileType) -> &'static str {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        if kind.is_fifo() {
+            return "a FIFO (pipe)";
+        }
+        if kind.is_socket() {
+            return "a socket";
+        }
+        if kind.is_block_device() || kind.is_char_device() {
+            return "a device";
+        }
+    }
+    if kind.is_dir() { "a folder" } else { "a special file" }
 }
 
 /// Whether a file has further names: hard links.
@@ -108,6 +130,27 @@ mod tests {
         }
         create(&hard).unwrap();
         assert_eq!(std::fs::read_to_string(&hard).unwrap(), "", "an own file is emptied");
+    }
+
+    #[test]
+    fn folders_devices_and_pipes_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let fifo = folder.path().join("fifo");
+        assert!(std::process::Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+        for (path, found) in [(folder.path(), "a folder"), (Path::new("/dev/zero"), "a device"), (&fifo, "a FIFO (pipe)")] {
+            let error = open(path).unwrap_err();
+            assert_eq!(error.to_string(), format!("is {found}, not a regular file; specify a file on disk"));
+        }
+        assert_eq!(open(&folder.path().join("missing")).unwrap_err().kind(), ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn a_link_to_a_file_is_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::fs::write(&file, "content").unwrap();
+        symlink(&file, &link).unwrap();
+        assert_eq!(std::io::read_to_string(open(&link).unwrap()).unwrap(), "content");
     }
 
     #[test]

@@ -4,9 +4,9 @@
 
 use super::ply::points;
 use crate::RecordingError;
-use std::fs::File;
 use std::io::{BufRead, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
+use zsim_base::files;
 use zsim_base::geometry::{Matrix, Vector};
 use zsim_base::ply::{Header, PlyFormat, PlyReader, Problem, Property, PropertyKind, Scalar};
 use zsim_base::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
@@ -57,7 +57,7 @@ pub fn write_surfel_map(out: impl Write, map: &SurfelMap) -> Result<(), Recordin
 /// # Errors
 /// As [`parse_surfel_map`], and when the file cannot be opened.
 pub fn read_surfel_map(path: &Path) -> Result<SurfelMap, RecordingError> {
-    let file = File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+    let file = files::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
     parse_surfel_map(&path.display().to_string(), file)
 }
 

@@ -8,6 +8,7 @@ use super::source::{Input, Source};
 use super::{bag, mcap_indexer, record};
 use crate::RecordingError;
 use std::path::Path;
+use zsim_base::files;
 
 /// Number of first bytes that identify a format.
 const MAGIC_BYTES: usize = 16;
@@ -86,8 +87,7 @@ impl RecordingFile {
     /// When it cannot be opened or read, or the format is not supported.
     pub fn open(number: u16, path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
-        let file =
-            std::fs::File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        let file = files::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         let source = Source::new(file)?;
         let format = detect_format(&source, &name)?;
         match format {

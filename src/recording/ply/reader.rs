@@ -2,6 +2,7 @@ use crate::{CloudPoint, RecordingError};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use zsim_base::files;
 use zsim_base::ply::{self, Element, Failure, PlyFormat, Row};
 use zsim_base::time::{Span, Stamp};
 
@@ -29,7 +30,7 @@ impl PlyReader<File> {
     /// # Errors
     /// When it cannot be opened, or the header is not that of a point cloud.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        let file = files::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         Self::new(&path.display().to_string(), file)
     }
 }

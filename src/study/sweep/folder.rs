@@ -82,7 +82,8 @@ impl Plan {
         let identity = self.write_points(&temporary, &written)?;
         let text = self.text_with(&identity.to_string())?;
         let points = points_path(folder);
-        if plan.exists() && std::fs::read_to_string(&plan).map_err(StudyError::file(&plan))? == text {
+        let read = |path: &Path| files::open(path).and_then(std::io::read_to_string).map_err(StudyError::file(path));
+        if plan.exists() && read(&plan)? == text {
             // The same content, unless the file is damaged or of a version with another format.
             std::fs::rename(&written, &points).map_err(StudyError::file(&points))?;
             return Sweep::open(folder);

@@ -207,6 +207,16 @@ mod tests {
     }
 
     #[test]
+    #[cfg(unix)]
+    fn a_pipe_in_place_of_a_table_is_an_error() {
+        let here = tempfile::tempdir().unwrap();
+        let pipe = here.path().join("points.csv");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let error = open(&pipe).unwrap_err().to_string();
+        assert!(error.contains("points.csv") && error.contains("is a FIFO (pipe)"), "{error}");
+    }
+
+    #[test]
     fn an_invalid_table_is_an_error_with_the_line() {
         let error = |text: &[u8]| read_columns(text, &COLUMNS[..2]).unwrap_err();
         assert!(error(b"").contains("no column `n`"));
