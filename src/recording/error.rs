@@ -28,6 +28,19 @@ pub enum RecordingError {
         /// How to convert it into a recording.
         remedy: String,
     },
+    /// The recording exceeds a limit that protects memory and time.
+    #[error(
+        "{name}: {quantity} exceeds {limit}; if the file is not damaged, copy the topics of lidar and IMU with `mcap filter`, \
+         `rosbag filter` or `ros2 bag convert`"
+    )]
+    Limit {
+        /// Name of the file.
+        name: String,
+        /// Quantity with its article.
+        quantity: String,
+        /// The limit with its unit.
+        limit: String,
+    },
     /// The folder does not contain exactly one recording.
     #[error("{}: the folder {problem}", path.display())]
     Folder {

@@ -5,6 +5,9 @@ use super::topics::shortened;
 use serde::Serialize;
 use std::fmt;
 
+/// Maximum number of messages in a compressed byte.
+const MAX_MESSAGES_PER_BYTE: u64 = 16;
+
 /// Data of a recording that could not be read.
 ///
 /// Whoever uses the remaining data reports it.
@@ -78,10 +81,15 @@ impl Loss {
     }
 
     /// Adds the losses of a pass through all messages, of which the summary counts `expected`.
+    ///
+    /// The count is only believed if messages can be missing: where the whole file was read, the count is wrong.
     pub(super) fn add_pass(&mut self, pass: &Messages<'_>, expected: Option<u64>) {
         self.damaged_chunks += pass.damaged().len() as u64;
         self.lost_bytes += pass.damaged().iter().map(|block| block.bytes).sum::<u64>();
-        self.missing_messages += expected.map_or(0, |expected| expected.saturating_sub(pass.count()));
+        let missing = expected.map_or(0, |expected| expected.saturating_sub(pass.count()));
+        if missing <= self.lost_bytes.saturating_mul(MAX_MESSAGES_PER_BYTE) {
+            self.missing_messages += missing;
+        }
     }
 
     /// Whether no data were lost.

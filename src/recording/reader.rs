@@ -1,12 +1,15 @@
 //! Opens a recording for reading, written by zsim or by another program.
 
-use crate::container::{Block, BlockKind, Channel, ChannelId, Messages, RawMessage, RecordingFile};
+use crate::container::{Block, Budget, Channel, ChannelId, Messages, RawMessage, RecordingFile};
 use crate::folder::list_files;
 use crate::topics::shortened;
 use crate::{Loss, RecordingError};
 use std::io::{Read, Seek};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use zsim_base::time::Stamp;
+
+/// Maximum number of topics in a message.
+const MAX_LISTED_TOPICS: usize = 100;
 
 /// A recording: an MCAP file, a ROS 1 bag, a rosbag2 database, or several of these from a split recording.
 ///
@@ -28,8 +31,9 @@ impl Reader {
     /// When a file cannot be opened or read, or the format is not supported. A truncated or damaged file is opened.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let paths = list_files(path)?;
-        let files =
-            paths.iter().zip(0..).map(|(path, number)| RecordingFile::open(number, path)).collect::<Result<_, _>>()?;
+        let mut budget = Budget::new(&path.display().to_string(), 0);
+        let open = |(path, number): (&PathBuf, _)| RecordingFile::open(number, path, &mut budget);
+        let files = paths.iter().zip(0..).map(open).collect::<Result<_, _>>()?;
         let name = if paths.len() == 1 { &paths[0] } else { path };
         Ok(Self::from_files(&name.display().to_string(), files))
     }
@@ -55,7 +59,7 @@ impl Reader {
 
     /// Manifest of the run that zsim recorded; `None` for a recording by another program.
     pub fn manifest(&self) -> Option<&str> {
-        self.files.iter().find_map(|file| Some(file.index.metadata.get("zsim")?.get("manifest")?.as_str()))
+        self.files.iter().find_map(|file| file.index.manifest.as_deref())
     }
 
     /// Losses known from the index.
@@ -93,21 +97,32 @@ impl Reader {
             self.channels.iter().map(|c| format!("{} ({})", shortened(&c.topic), shortened(&c.type_name))).collect();
         topics.sort();
         topics.dedup();
-        if topics.is_empty() { "no topics".to_owned() } else { topics.join(", ") }
+        let others = topics.len().saturating_sub(MAX_LISTED_TOPICS);
+        topics.truncate(MAX_LISTED_TOPICS);
+        match (topics.is_empty(), others) {
+            (true, _) => "no topics".to_owned(),
+            (_, 0) => topics.join(", "),
+            _ => format!("{} and {others} other topics", topics.join(", ")),
+        }
     }
 
     fn blocks(&self) -> impl Iterator<Item = (&RecordingFile, &Block)> {
         self.files.iter().flat_map(|file| file.index.blocks.iter().map(move |block| (file, block)))
     }
 
+    /// What one pass through the messages may use.
+    fn budget(&self) -> Budget {
+        Budget::new(&self.name, self.length_bytes())
+    }
+
     /// All messages in order of log time.
     pub(super) fn messages(&self) -> Messages<'_> {
-        Messages::new(self.blocks())
+        Messages::new(self.blocks(), self.budget())
     }
 
     /// Messages of all blocks that may contain messages of `channels`; includes other messages of these blocks.
     pub(super) fn messages_in_blocks_of(&self, channels: &[ChannelId]) -> Messages<'_> {
-        Messages::new(self.blocks_of(channels).into_iter())
+        Messages::new(self.blocks_of(channels).into_iter(), self.budget())
     }
 
     fn blocks_of(&self, channels: &[ChannelId]) -> Vec<(&RecordingFile, &Block)> {
@@ -136,7 +151,7 @@ impl Reader {
         let candidates = self.blocks_of(channels);
         let step = candidates.len().div_ceil(blocks).max(1);
         for block in candidates.iter().step_by(step) {
-            let (mut messages, mut remaining) = (Messages::new(std::iter::once(*block)), each);
+            let (mut messages, mut remaining) = (Messages::new(std::iter::once(*block), self.budget()), each);
             while remaining > 0 {
                 let Some(message) = messages.next()? else { break };
                 if channels.contains(&message.channel) {
@@ -150,26 +165,7 @@ impl Reader {
 
     /// Number of messages according to the summaries; `None` if a file has none, or its number cannot be right.
     pub(super) fn expected_messages(&self) -> Option<u64> {
-        self.files.iter().try_fold(0_u64, |sum, file| {
-            let expected = file.index.expected_messages?;
-            let possible = file.index.blocks.iter().fold(0_u64, |sum, block| sum.saturating_add(max_messages(block)));
-            (expected <= possible).then(|| sum.saturating_add(expected))
-        })
+        let counts = self.files.iter().map(|file| file.index.expected_messages);
+        counts.reduce(|a, b| Some(a?.saturating_add(b?))).flatten()
     }
-}
-
-/// Maximum number of messages in a block, from its size.
-fn max_messages(block: &Block) -> u64 {
-    /// Bytes of an MCAP message without data; those of other formats are longer.
-    const MESSAGE_BYTES: u64 = 31;
-    /// Maximum compression of a chunk that is credible.
-    const MAX_COMPRESSION: u64 = 4096;
-    let bytes = match &block.kind {
-        BlockKind::Chunk(chunk) => chunk.uncompressed_size.min(block.length.saturating_mul(MAX_COMPRESSION)),
-        BlockKind::BagChunk(chunk) => chunk.size.min(block.length.saturating_mul(MAX_COMPRESSION)),
-        BlockKind::Plain => block.length,
-        // The rows are counted.
-        BlockKind::Rows { .. } => return u64::MAX,
-    };
-    bytes / MESSAGE_BYTES
 }

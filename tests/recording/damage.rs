@@ -91,6 +91,27 @@ fn a_damaged_chunk_is_skipped_and_counted() {
 }
 
 #[test]
+fn a_wrong_count_in_the_summary_is_no_loss_of_messages() {
+    let (bytes, _) = &*RECORDING;
+    let count = mcap::Summary::read(bytes).unwrap().unwrap().stats.unwrap().message_count;
+    // Statistics: opcode, length, number of messages. The footer ends with the checksum, here none, and the magic bytes.
+    let at = bytes.windows(8).rposition(|window| window == count.to_le_bytes()).unwrap();
+    assert_eq!(bytes[at - 9], 0x0B);
+    let end = bytes.len();
+    for wrong in [count + 1000, u64::MAX] {
+        let mut edited = bytes.clone();
+        edited[at..at + 8].copy_from_slice(&wrong.to_le_bytes());
+        edited[end - 12..end - 8].fill(0);
+        assert!(read(edited.clone()).unwrap().1.is_none());
+        // With a damaged chunk a credible count shows how many messages are missing.
+        edited[(chunks()[1].bytes.end - 5000) as usize] ^= 0x10;
+        let loss = read(edited).unwrap().1;
+        let missing = if wrong == u64::MAX { 0 } else { chunks()[1].messages + 1000 };
+        assert_eq!((loss.damaged_chunks, loss.missing_messages), (1, missing));
+    }
+}
+
+#[test]
 fn an_incorrect_record_length_loses_at_most_its_chunk() {
     let (bytes, written) = &*RECORDING;
     let chunks = chunks();
@@ -146,7 +167,7 @@ proptest! {
 }
 
 /// An MCAP file of one chunk that declares an uncompressed size of `claimed` bytes.
-fn file_with_chunk(packed: &[u8], compression: &str, claimed: u64) -> Vec<u8> {
+pub fn file_with_chunk(packed: &[u8], compression: &str, claimed: u64) -> Vec<u8> {
     let mut file = b"\x89MCAP0\r\n".to_vec();
     let mut chunk = [0_u64.to_le_bytes(), 0_u64.to_le_bytes(), claimed.to_le_bytes()].concat();
     chunk.extend(0_u32.to_le_bytes());

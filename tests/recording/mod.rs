@@ -1,10 +1,12 @@
 //! Recordings: round trips, files of other programs, damage, and independent readers.
 
+mod bags;
 mod damage;
 mod drivers;
 pub mod foreign;
 mod formats;
 mod frames;
+mod hostile;
 mod killed;
 mod las;
 mod live;

@@ -1,8 +1,9 @@
 //! Reads rosbag2 SQLite databases: a table of topics, and one of messages in recording order.
 
+use super::budget::Budget;
 use super::entry::{Damage, Entry};
 use super::file_index::{Block, BlockKind, Ending, FileIndex};
-use super::record::{ChannelRecord, SchemaRecord};
+use super::record::{ChannelFields, SchemaFields};
 use crate::RecordingError;
 use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, Row};
@@ -65,10 +66,11 @@ impl SqliteDatabase {
     /// Indexes the database.
     ///
     /// # Errors
-    /// When it is not a rosbag2 database (`name` is for the message).
-    pub fn build_index(&self, name: &str) -> Result<FileIndex, RecordingError> {
+    /// When it is not a rosbag2 database, or exceeds `budget`.
+    pub fn build_index(&self, budget: &mut Budget) -> Result<FileIndex, RecordingError> {
         let database = self.lock();
-        let database_error = |problem: String| RecordingError::Database { name: name.to_owned(), problem };
+        let name = budget.name().to_owned();
+        let database_error = |problem: String| RecordingError::Database { name: name.clone(), problem };
         // The schema of the file is untrusted: no functions with side effects, no views in place of tables.
         database
             .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;")
@@ -78,10 +80,11 @@ impl SqliteDatabase {
             check_table(&database, table, columns).map_err(&database_error)?;
         }
         let mut index = FileIndex::empty();
-        read_topics(&database, &mut index).map_err(|error| database_error(error.to_string()))?;
-        index.ending = match build_blocks(&database, &mut index) {
-            Ok(true) => Ending::Complete,
-            Ok(false) | Err(_) => Ending::CutShort,
+        read_topics(&database, &mut index, budget).map_err(|error| database_error(error.to_string()))??;
+        index.ending = match build_blocks(&database, &mut index, budget) {
+            Ok(Ok(true)) => Ending::Complete,
+            Ok(Ok(false)) | Err(_) => Ending::CutShort,
+            Ok(Err(error)) => return Err(error),
         };
         Ok(index)
     }
@@ -156,30 +159,46 @@ fn check_table(database: &Connection, table: &str, columns: &[&str]) -> Result<(
     Ok(())
 }
 
-fn read_topics(database: &Connection, index: &mut FileIndex) -> rusqlite::Result<()> {
+/// Reads the table of topics. The inner error is an exhausted budget.
+fn read_topics(
+    database: &Connection,
+    index: &mut FileIndex,
+    budget: &mut Budget,
+) -> rusqlite::Result<Result<(), RecordingError>> {
     let mut statement =
         database.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY rowid LIMIT 65536")?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
         let Ok(id) = u16::try_from(row.get::<_, i64>(0)?) else { continue };
-        let name: String = row.get(2)?;
-        let has_header = crate::schema::MessageType::has_header(&name);
-        index.schemas.insert(id, SchemaRecord { id, name, has_header });
-        index.channels.insert(id, ChannelRecord { id, schema: id, topic: row.get(1)?, encoding: row.get(3)? });
+        let (topic, name, encoding) = (row.get_ref(1)?.as_str()?, row.get_ref(2)?.as_str()?, row.get_ref(3)?.as_str()?);
+        let channel = ChannelFields { id, schema: id, topic, encoding };
+        let mut add = || -> Result<(), RecordingError> {
+            index.add_channel(channel, budget)?;
+            let has_header = crate::schema::MessageType::has_header(name);
+            index.add_schema(SchemaFields { id, name, has_header }, budget)
+        };
+        if let Err(error) = add() {
+            return Ok(Err(error));
+        }
     }
-    Ok(())
+    Ok(Ok(()))
 }
 
-/// Groups messages to blocks, without reading them. `false` if row numbers stop increasing.
-fn build_blocks(database: &Connection, index: &mut FileIndex) -> rusqlite::Result<bool> {
+/// Groups messages to blocks, without reading them. `false` if row numbers stop increasing; the inner error is an exhausted
+/// budget.
+fn build_blocks(
+    database: &Connection,
+    index: &mut FileIndex,
+    budget: &mut Budget,
+) -> rusqlite::Result<Result<bool, RecordingError>> {
     let mut statement =
-        database.prepare("SELECT rowid, topic_id, timestamp, length(data) FROM messages ORDER BY rowid")?;
+        database.prepare("SELECT rowid, topic_id, timestamp, octet_length(data) FROM messages ORDER BY rowid")?;
     let mut rows = statement.query([])?;
     let (mut messages, mut total, mut order) = (0, 0, RowOrder::default());
     while let Some(row) = rows.next()? {
         let (id, channel) = (row.get(0)?, u16::try_from(row.get::<_, i64>(1)?));
         if !order.advances(id) {
-            return Ok(false);
+            return Ok(Ok(false));
         }
         let (time, bytes) = (time_ns(row, 2)?, row.get::<_, Option<i64>>(3)?.unwrap_or(0).unsigned_abs());
         let Ok(channel) = channel else { continue };
@@ -200,10 +219,13 @@ fn build_blocks(database: &Connection, index: &mut FileIndex) -> rusqlite::Resul
             _ => {
                 messages = 1;
                 let kind = BlockKind::Rows { first: id, last: id };
-                index.blocks.push(Block { offset: 0, length: bytes, start_ns: time, kind, indexed: vec![channel] });
+                let block = Block { offset: 0, length: bytes, start_ns: time, kind, indexed: vec![channel] };
+                if let Err(error) = index.add_block(block, budget) {
+                    return Ok(Err(error));
+                }
             }
         }
         index.expected_messages = Some(total);
     }
-    Ok(true)
+    Ok(Ok(true))
 }

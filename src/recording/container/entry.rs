@@ -17,7 +17,7 @@ pub struct Entry {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Damage {
     /// It exceeds the maximum size.
-    #[error("its stated size exceeds 256 MiB")]
+    #[error("it exceeds 256 MiB or 4 million messages")]
     TooLarge,
     /// Unsupported compression.
     #[error("its compression is not supported")]

@@ -1,9 +1,13 @@
 //! Index of a file: topics, definitions and blocks, without the messages.
 
-use super::record::{self, ChannelRecord, ChunkHeader, SchemaRecord, op};
+use super::budget::Budget;
+use super::encoding::Encoding;
+use super::record::{self, ChannelFields, SchemaFields, op};
+use crate::RecordingError;
 use crate::topics::printable;
 use crate::wire::WireFormat;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Number of a topic within a recording: number of the file and number within the file.
 pub type ChannelId = u32;
@@ -41,14 +45,14 @@ pub struct Block {
 }
 
 /// Storage of a block.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockKind {
     /// MCAP chunk.
-    Chunk(ChunkHeader),
+    Chunk(Encoding),
     /// Consecutive MCAP records outside a chunk.
     Plain,
     /// ROS 1 bag chunk.
-    BagChunk(BagChunk),
+    BagChunk(Encoding),
     /// Database rows.
     Rows {
         /// First row number.
@@ -56,15 +60,6 @@ pub enum BlockKind {
         /// Last row number.
         last: i64,
     },
-}
-
-/// Compression of a chunk.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BagChunk {
-    /// `none`, `lz4` or `bz2`.
-    pub compression: String,
-    /// Uncompressed size, bytes.
-    pub size: u64,
 }
 
 impl Block {
@@ -82,23 +77,43 @@ impl Block {
 pub enum Ending {
     /// The file has a summary and a footer.
     Complete,
-    /// The summary's checksum does not match; it is ignored.
+    /// The summary is damaged or disagrees with the data; it is ignored.
     SummaryDamaged,
     /// The file has no summary: the writer was stopped, or it is truncated.
     CutShort,
+}
+
+/// Message type definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Schema {
+    /// Type name: `package/msg/Type`.
+    pub name: String,
+    /// Whether the first field is a `std_msgs/Header`.
+    pub has_header: bool,
+}
+
+/// Topic of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileChannel {
+    /// Number of the message definition.
+    pub schema: u16,
+    /// Topic name.
+    pub topic: String,
+    /// Message encoding: `cdr` in the ROS 2 profile.
+    pub encoding: String,
 }
 
 /// Index of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileIndex {
     /// Message definitions by number.
-    pub schemas: BTreeMap<u16, SchemaRecord>,
+    pub schemas: BTreeMap<u16, Schema>,
     /// Topics by number.
-    pub channels: BTreeMap<u16, ChannelRecord>,
+    pub channels: BTreeMap<u16, FileChannel>,
     /// Blocks with messages, in file order.
     pub blocks: Vec<Block>,
-    /// Metadata records by name; the first one of each name.
-    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// Manifest of the run, if zsim recorded it.
+    pub manifest: Option<String>,
     /// Completeness of the file.
     pub ending: Ending,
     /// Bytes that belong to no readable record.
@@ -114,35 +129,72 @@ impl FileIndex {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             blocks: Vec::new(),
-            metadata: BTreeMap::new(),
+            manifest: None,
             ending: Ending::CutShort,
             lost_bytes: 0,
             expected_messages: None,
         }
     }
 
-    /// Adds a type or topic definition; the first one of each number applies. `false` if it is damaged.
-    pub fn define(&mut self, opcode: u8, fields: &[u8]) -> bool {
-        match opcode {
-            op::SCHEMA => record::schema(fields).map(|schema| {
-                self.schemas.entry(schema.id).or_insert(schema);
-            }),
-            _ => record::channel(fields).map(|channel| {
-                self.channels.entry(channel.id).or_insert(channel);
-            }),
+    /// Adds the definition in an MCAP record. `false` if it is damaged.
+    ///
+    /// # Errors
+    /// When the budget is exhausted.
+    pub fn define(&mut self, opcode: u8, fields: &[u8], budget: &mut Budget) -> Result<bool, RecordingError> {
+        let channel = record::channel(fields).filter(|_| opcode == op::CHANNEL);
+        let schema = record::schema(fields).filter(|_| opcode == op::SCHEMA);
+        channel.map(|channel| self.add_channel(channel, budget)).transpose()?;
+        schema.map(|schema| self.add_schema(schema, budget)).transpose()?;
+        Ok(channel.is_some() || schema.is_some())
+    }
+
+    /// Adds a type; the first one of each number applies.
+    ///
+    /// # Errors
+    /// When the budget is exhausted.
+    pub fn add_schema(&mut self, schema: SchemaFields<'_>, budget: &mut Budget) -> Result<(), RecordingError> {
+        if let Entry::Vacant(entry) = self.schemas.entry(schema.id) {
+            entry.insert(Schema { name: budget.copy_name(schema.name)?, has_header: schema.has_header });
         }
-        .is_some()
+        Ok(())
+    }
+
+    /// Adds a topic; the first one of each number applies.
+    ///
+    /// # Errors
+    /// When the budget is exhausted.
+    pub fn add_channel(&mut self, channel: ChannelFields<'_>, budget: &mut Budget) -> Result<(), RecordingError> {
+        if let Entry::Vacant(entry) = self.channels.entry(channel.id) {
+            let (topic, encoding) = (budget.copy_name(channel.topic)?, budget.copy_name(channel.encoding)?);
+            entry.insert(FileChannel { schema: channel.schema, topic, encoding });
+        }
+        Ok(())
+    }
+
+    /// Adds a block.
+    ///
+    /// # Errors
+    /// When the budget is exhausted.
+    pub fn add_block(&mut self, block: Block, budget: &mut Budget) -> Result<(), RecordingError> {
+        budget.item(size_of::<Block>())?;
+        self.blocks.push(block);
+        Ok(())
+    }
+
+    /// Whether `block` has messages of a topic that is not defined.
+    pub fn lacks_definitions_of(&self, block: &Block) -> bool {
+        block.indexed.iter().any(|id| !self.channels.contains_key(id))
     }
 
     /// Topics by number; `id_of` maps a number in the file to one in the recording.
     pub fn channels(&self, id_of: impl Fn(u16) -> ChannelId) -> impl Iterator<Item = Channel> {
-        self.channels.values().map(move |record| Channel {
-            id: id_of(record.id),
-            topic: printable(&record.topic),
-            type_name: self.schemas.get(&record.schema).map(|schema| printable(&schema.name)).unwrap_or_default(),
-            encoding: printable(&record.encoding),
-            wire: WireFormat::from_encoding(&record.encoding),
-            has_header: self.schemas.get(&record.schema).is_some_and(|schema| schema.has_header),
+        self.channels.iter().map(move |(id, channel)| Channel {
+            id: id_of(*id),
+            topic: printable(&channel.topic),
+            type_name: self.schemas.get(&channel.schema).map(|schema| printable(&schema.name)).unwrap_or_default(),
+            encoding: printable(&channel.encoding),
+            wire: WireFormat::from_encoding(&channel.encoding),
+            has_header: self.schemas.get(&channel.schema).is_some_and(|schema| schema.has_header),
         })
     }
 }

@@ -1,11 +1,12 @@
 //! Detects the container format of a file from the first bytes, and advises on unsupported ones.
 
+use super::budget::Budget;
 use super::database::{self, SqliteDatabase};
 use super::file_index::{BlockKind, Ending, FileIndex};
 use super::loaded_block::LoadedBlock;
 use super::recording_file::{RecordingFile, Store};
 use super::source::{Input, Source};
-use super::{bag, mcap_indexer, record};
+use super::{bag, bag_indexer, mcap_indexer, record};
 use crate::RecordingError;
 use std::path::Path;
 use zsim_base::files;
@@ -84,52 +85,52 @@ impl RecordingFile {
     /// Opens the file at `path`, which has the given number among the files of the recording.
     ///
     /// # Errors
-    /// When it cannot be opened or read, or the format is not supported.
-    pub fn open(number: u16, path: &Path) -> Result<Self, RecordingError> {
+    /// When it cannot be opened or read, the format is not supported, or the recording exceeds `budget`.
+    pub fn open(number: u16, path: &Path, budget: &mut Budget) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         let file = files::open(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
         let source = Source::new(file)?;
         let format = detect_format(&source, &name)?;
+        budget.add_file(&name, source.length());
         match format {
-            Format::Database => Self::from_database(number, SqliteDatabase::open(path)?, &name),
-            Format::Mcap | Format::Bag => Self::from_records(number, source, format, &name),
+            Format::Database => Self::from_database(number, SqliteDatabase::open(path)?, budget),
+            Format::Mcap | Format::Bag => Self::from_records(number, source, format, budget),
         }
     }
 
     /// Opens `input`, called `name` in messages.
     ///
     /// # Errors
-    /// When it cannot be read, or the format is not supported.
+    /// When it cannot be read, the format is not supported, or it exceeds the limits of a recording.
     pub fn from_input(name: &str, input: impl Input + 'static) -> Result<Self, RecordingError> {
         let source = Source::new(input)?;
         let format = detect_format(&source, name)?;
-        if format != Format::Database {
-            return Self::from_records(0, source, format, name);
-        }
         let length = source.length();
+        let mut budget = Budget::new(name, length);
+        if format != Format::Database {
+            return Self::from_records(0, source, format, &mut budget);
+        }
         if length > MAX_IN_MEMORY_BYTES {
             let problem = "it exceeds the 1 GiB limit for a stream".to_owned();
             return Err(RecordingError::Database { name: name.to_owned(), problem });
         }
         let mut bytes = Vec::new();
         source.read_at(0, length as usize, &mut bytes)?;
-        Self::from_database(0, SqliteDatabase::in_memory(&bytes)?, name)
+        Self::from_database(0, SqliteDatabase::in_memory(&bytes)?, &mut budget)
     }
 
-    fn from_database(number: u16, database: SqliteDatabase, name: &str) -> Result<Self, RecordingError> {
-        let index = database.build_index(name)?;
+    fn from_database(number: u16, database: SqliteDatabase, budget: &mut Budget) -> Result<Self, RecordingError> {
+        let index = database.build_index(budget)?;
         Ok(Self::new(number, Store::Database(database), index))
     }
 
-    fn from_records(number: u16, source: Source, format: Format, name: &str) -> Result<Self, RecordingError> {
+    fn from_records(number: u16, source: Source, format: Format, budget: &mut Budget) -> Result<Self, RecordingError> {
         let mut index = match format {
-            Format::Bag => bag::index_bag(&source, name)?,
-            _ => mcap_indexer::index_mcap(&source)?,
+            Format::Bag => bag_indexer::index_bag(&source, budget)?,
+            _ => mcap_indexer::index_mcap(&source, budget)?,
         };
         let store = Store::Records(source);
-        if index.ending != Ending::Complete || index.channels.is_empty() {
-            find_definitions(&store, &mut index)?;
-        }
+        find_definitions(&store, &mut index, budget)?;
         Ok(Self::new(number, store, index))
     }
 }
@@ -141,13 +142,17 @@ fn detect_format(source: &Source, name: &str) -> Result<Format, RecordingError> 
 }
 
 /// Reads the definitions inside chunks, if no summary repeats them.
-fn find_definitions(store: &Store, index: &mut FileIndex) -> Result<(), RecordingError> {
-    let mut loaded = LoadedBlock::default();
+fn find_definitions(store: &Store, index: &mut FileIndex, budget: &mut Budget) -> Result<(), RecordingError> {
+    let in_all = index.ending != Ending::Complete || index.channels.is_empty();
+    let (mut loaded, mut compressed) = (LoadedBlock::default(), Vec::new());
     for k in 0..index.blocks.len() {
         let block = &index.blocks[k];
-        let may_define = matches!(block.kind, BlockKind::Chunk(_) | BlockKind::BagChunk(_));
-        if may_define && loaded.load(store, block)?.is_ok() {
-            loaded.add_definitions_to(index);
+        let is_chunk = matches!(block.kind, BlockKind::Chunk(_) | BlockKind::BagChunk(_));
+        if is_chunk && (in_all || index.lacks_definitions_of(block)) {
+            let kind = block.kind;
+            // A damaged chunk of a bag is read as far as it is intact, another one not at all.
+            let _ = loaded.load(store, block, &mut compressed, budget)?;
+            loaded.add_definitions_to(index, kind, budget)?;
         }
     }
     Ok(())

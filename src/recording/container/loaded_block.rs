@@ -1,35 +1,23 @@
 //! Loads a block of a file into memory: decompresses and checks it, and sorts the messages by log time.
 
-use super::bag::{self, BagRecord};
-use super::database::SqliteDatabase;
+use super::bag;
+use super::budget::Budget;
+use super::encoding::MAX_BLOCK_BYTES;
 use super::entry::{Damage, Entry};
 use super::file_index::{Block, BlockKind, FileIndex};
-use super::mcap_summary::next_record;
-use super::record::{self, Fields, op};
+use super::record::{self, Fields, next_record, op};
 use super::recording_file::Store;
 use crate::RecordingError;
 use std::io::Read;
-use std::ops::Range;
 
-/// Maximum size of a block in memory, compressed or not, bytes.
-///
-/// Writers make chunks of about 1 MB; a larger claim is a decompression bomb or a damaged length.
-const MAX_BLOCK_BYTES: u64 = 256 << 20;
+/// Maximum number of messages of a block.
+const MAX_BLOCK_MESSAGES: usize = 4 << 20;
+
+/// Capacity of a buffer that is kept for the next block, bytes: that of all but exceptional chunks.
+const MAX_KEPT_BYTES: usize = 16 << 20;
 
 /// First bytes of a zstd frame; a serialised message does not start with them.
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
-
-/// Maximum memory reserved before decompression, bytes.
-const INITIAL_CAPACITY: u64 = 1 << 20;
-
-/// Kind of a definition within a block.
-#[derive(Debug, Clone, Copy)]
-enum Definition {
-    /// MCAP schema or channel record, by opcode.
-    Record(u8),
-    /// Connection record of a bag.
-    Connection,
-}
 
 /// Block in memory. The buffers are reused for the next one.
 #[derive(Debug, Default)]
@@ -38,62 +26,100 @@ pub struct LoadedBlock {
     pub bytes: Vec<u8>,
     /// Messages in order of log time; at equal log times, in file order.
     pub entries: Vec<Entry>,
-    definitions: Vec<(Definition, Range<usize>)>,
-    compressed: Vec<u8>,
 }
 
 impl LoadedBlock {
-    /// Replaces the content by `block`.
+    /// Replaces the content by `block`. `compressed` is a buffer for compressed bytes.
     ///
     /// # Errors
-    /// When the file cannot be read; the inner error is damage of the block itself.
-    pub fn load(&mut self, store: &Store, block: &Block) -> Result<Result<(), Damage>, RecordingError> {
+    /// When the file cannot be read, or the budget is exhausted. The inner error is damage of the block itself; the
+    /// messages are then those that are intact.
+    pub fn load(
+        &mut self,
+        store: &Store,
+        block: &Block,
+        compressed: &mut Vec<u8>,
+        budget: &mut Budget,
+    ) -> Result<Result<(), Damage>, RecordingError> {
+        self.clear();
+        let loaded = self.read(store, block, compressed)?;
+        compressed.clear();
+        compressed.shrink_to(MAX_KEPT_BYTES);
+        let decompressed = self.decompress_messages();
+        if !self.entries.is_sorted_by_key(|entry| entry.log_time_ns) {
+            self.entries.sort_by_key(|entry| entry.log_time_ns);
+        }
+        budget.decompress(self.bytes.len() as u64)?;
+        Ok(loaded.and(decompressed))
+    }
+
+    /// Memory of the content, bytes.
+    pub fn size(&self) -> usize {
+        size_of::<Self>() + self.bytes.capacity() + self.entries.capacity() * size_of::<Entry>()
+    }
+
+    fn clear(&mut self) {
         self.bytes.clear();
+        self.bytes.shrink_to(MAX_KEPT_BYTES);
         self.entries.clear();
-        self.definitions.clear();
+        self.entries.shrink_to(MAX_KEPT_BYTES / size_of::<Entry>());
+    }
+
+    fn read(
+        &mut self,
+        store: &Store,
+        block: &Block,
+        compressed: &mut Vec<u8>,
+    ) -> Result<Result<(), Damage>, RecordingError> {
         let Some(length) = usize::try_from(block.length).ok().filter(|_| block.length <= MAX_BLOCK_BYTES) else {
             return Ok(Err(Damage::TooLarge));
         };
         let source = match store {
             Store::Records(source) => source,
-            Store::Database(database) => return Ok(self.load_rows(database, block)),
+            Store::Database(database) => {
+                let BlockKind::Rows { first, last } = block.kind else { return Ok(Err(Damage::Records)) };
+                return Ok(database.read((first, last), &mut self.bytes, &mut self.entries));
+            }
         };
-        let located = match &block.kind {
-            BlockKind::Plain => {
-                source.read_at(block.offset, length, &mut self.bytes)?;
-                self.locate_records()
+        let into = if block.kind == BlockKind::Plain { &mut self.bytes } else { &mut *compressed };
+        source.read_at(block.offset, length, into)?;
+        Ok(match block.kind {
+            BlockKind::Plain => self.locate_records(),
+            BlockKind::Chunk(encoding) => {
+                encoding.decompress(compressed, &mut self.bytes).and_then(|()| self.locate_records())
             }
-            BlockKind::Chunk(header) => {
-                source.read_at(block.offset, length, &mut self.compressed)?;
-                let encoding =
-                    ChunkEncoding { compression: &header.compression, size: header.uncompressed_size, crc: header.crc };
-                decompress(encoding, &self.compressed, &mut self.bytes).and_then(|()| self.locate_records())
-            }
-            BlockKind::BagChunk(chunk) => {
-                source.read_at(block.offset, length, &mut self.compressed)?;
-                let encoding = ChunkEncoding { compression: &chunk.compression, size: chunk.size, crc: 0 };
-                decompress(encoding, &self.compressed, &mut self.bytes).and_then(|()| self.locate_bag_records())
+            BlockKind::BagChunk(encoding) => {
+                let decompressed = encoding.decompress_intact(compressed, &mut self.bytes);
+                let located = self.locate_bag_records();
+                decompressed.and(located)
             }
             BlockKind::Rows { .. } => Err(Damage::Records),
-        };
-        Ok(located.and_then(|()| self.decompress_and_sort()))
+        })
     }
 
-    fn load_rows(&mut self, database: &SqliteDatabase, block: &Block) -> Result<(), Damage> {
-        let BlockKind::Rows { first, last } = block.kind else { return Err(Damage::Records) };
-        database.read((first, last), &mut self.bytes, &mut self.entries)?;
-        self.decompress_and_sort()
-    }
-
-    /// Adds the definitions of this block to the index.
-    pub fn add_definitions_to(&self, index: &mut FileIndex) {
-        for (definition, range) in &self.definitions {
-            let bytes = &self.bytes[range.clone()];
-            match definition {
-                Definition::Record(opcode) => index.define(*opcode, bytes),
-                Definition::Connection => index.define_connection(bytes),
-            };
+    /// Adds the definitions of this block, loaded from `block`, to the index.
+    ///
+    /// # Errors
+    /// When the budget is exhausted.
+    pub fn add_definitions_to(
+        &self,
+        index: &mut FileIndex,
+        kind: BlockKind,
+        budget: &mut Budget,
+    ) -> Result<(), RecordingError> {
+        if let BlockKind::BagChunk(_) = kind {
+            for connection in bag::connections_in_chunk(&self.bytes) {
+                index.define_connection(connection, budget)?;
+            }
+            return Ok(());
         }
+        let mut fields = Fields::new(&self.bytes);
+        while let Some((opcode, record)) = next_record(&mut fields) {
+            if matches!(opcode, op::SCHEMA | op::CHANNEL) {
+                index.define(opcode, record, budget)?;
+            }
+        }
+        Ok(())
     }
 
     /// Locates the MCAP records.
@@ -101,17 +127,11 @@ impl LoadedBlock {
         let mut fields = Fields::new(&self.bytes);
         while !fields.rest().is_empty() {
             let (opcode, record) = next_record(&mut fields).ok_or(Damage::Records)?;
-            let end = self.bytes.len() - fields.rest().len();
-            match opcode {
-                op::MESSAGE => {
-                    let header = record::message_header(record).ok_or(Damage::Records)?;
-                    let data = end - record.len() + record::MESSAGE_FIELDS..end;
-                    self.entries.push(Entry { channel: header.channel, log_time_ns: header.log_time_ns, data });
-                }
-                op::SCHEMA | op::CHANNEL => {
-                    self.definitions.push((Definition::Record(opcode), end - record.len()..end));
-                }
-                _ => {}
+            if opcode == op::MESSAGE {
+                let end = self.bytes.len() - fields.rest().len();
+                let header = record::message_header(record).ok_or(Damage::Records)?;
+                let data = end - record.len() + record::MESSAGE_FIELDS..end;
+                push(&mut self.entries, Entry { channel: header.channel, log_time_ns: header.log_time_ns, data })?;
             }
         }
         Ok(())
@@ -119,24 +139,17 @@ impl LoadedBlock {
 
     /// Locates the bag records.
     fn locate_bag_records(&mut self) -> Result<(), Damage> {
-        let mut fields = Fields::new(&self.bytes);
-        while !fields.rest().is_empty() {
-            let start = self.bytes.len() - fields.rest().len();
-            let (record, length) = bag::next_in_chunk(&mut fields).ok_or(Damage::Records)?;
-            let end = self.bytes.len() - fields.rest().len();
-            match record {
-                BagRecord::Message(channel, log_time_ns) => {
-                    self.entries.push(Entry { channel, log_time_ns, data: end - length..end });
-                }
-                BagRecord::Connection => self.definitions.push((Definition::Connection, start..end)),
-                BagRecord::Other => {}
+        let mut records = bag::ChunkRecords::new(&self.bytes);
+        for record in &mut records {
+            if let Some((channel, log_time_ns)) = record.message {
+                push(&mut self.entries, Entry { channel, log_time_ns, data: record.data })?;
             }
         }
-        Ok(())
+        if records.is_damaged() { Err(Damage::Records) } else { Ok(()) }
     }
 
-    /// Decompresses messages that are compressed individually (a rosbag2 option), then sorts the messages.
-    fn decompress_and_sort(&mut self) -> Result<(), Damage> {
+    /// Decompresses messages that are compressed individually (a rosbag2 option).
+    fn decompress_messages(&mut self) -> Result<(), Damage> {
         for k in 0..self.entries.len() {
             let data = self.entries[k].data.clone();
             if !self.bytes[data.clone()].starts_with(&ZSTD_MAGIC) {
@@ -148,50 +161,24 @@ impl LoadedBlock {
                 .and_then(|zstd| zstd.take(limit + 1).read_to_end(&mut self.bytes));
             match decompressed {
                 Ok(size) if size as u64 <= limit => self.entries[k].data = start..self.bytes.len(),
-                Ok(_) => return Err(Damage::TooLarge),
+                Ok(_) => {
+                    self.bytes.truncate(start);
+                    self.entries.truncate(k);
+                    return Err(Damage::TooLarge);
+                }
                 // The message remains compressed and is counted as undecodable later.
                 Err(_) => self.bytes.truncate(start),
             }
-        }
-        if !self.entries.is_sorted_by_key(|entry| entry.log_time_ns) {
-            self.entries.sort_by_key(|entry| entry.log_time_ns);
         }
         Ok(())
     }
 }
 
-/// Compression of a chunk, uncompressed size in bytes, and CRC-32 of the uncompressed bytes (0 if there is none).
-#[derive(Clone, Copy)]
-struct ChunkEncoding<'a> {
-    compression: &'a str,
-    size: u64,
-    crc: u32,
-}
-
-/// Decompresses a chunk into `bytes` and checks it.
-fn decompress(encoding: ChunkEncoding<'_>, compressed: &[u8], bytes: &mut Vec<u8>) -> Result<(), Damage> {
-    if encoding.size > MAX_BLOCK_BYTES {
+/// Adds a message, if a block may have more.
+fn push(entries: &mut Vec<Entry>, entry: Entry) -> Result<(), Damage> {
+    if entries.len() >= MAX_BLOCK_MESSAGES {
         return Err(Damage::TooLarge);
     }
-    bytes.clear();
-    bytes.reserve(encoding.size.min(INITIAL_CAPACITY) as usize);
-    // One byte more than stated reveals a false size; never more is decompressed.
-    let limit = encoding.size + 1;
-    let decompressed = match encoding.compression {
-        "" | "none" => compressed.take(limit).read_to_end(bytes),
-        "zstd" => {
-            zstd::stream::read::Decoder::with_buffer(compressed).and_then(|zstd| zstd.take(limit).read_to_end(bytes))
-        }
-        "lz4" => lz4_flex::frame::FrameDecoder::new(compressed).take(limit).read_to_end(bytes),
-        "bz2" => bzip2::bufread::MultiBzDecoder::new(compressed).take(limit).read_to_end(bytes),
-        _ => return Err(Damage::Compression),
-    };
-    match decompressed {
-        Ok(size) if size as u64 == encoding.size => {}
-        _ => return Err(Damage::Decompression),
-    }
-    if encoding.crc != 0 && crc32fast::hash(bytes) != encoding.crc {
-        return Err(Damage::Checksum);
-    }
+    entries.push(entry);
     Ok(())
 }

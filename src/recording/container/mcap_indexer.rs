@@ -1,5 +1,6 @@
 //! Indexes an MCAP file record by record.
 
+use super::budget::Budget;
 use super::file_index::{Block, BlockKind, Ending, FileIndex};
 use super::mcap_summary::{self, McapSummary};
 use super::record::{self, MAGIC, MESSAGE_FIELDS, PREFIX, op};
@@ -13,14 +14,18 @@ const MAX_RECORD_BYTES: u64 = 16 << 20;
 /// Bytes of a chunk record that are sufficient for the header: fixed fields and a 64-byte compression name.
 const CHUNK_HEADER_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 64 + 8;
 
+/// Name and key of the metadata in which [`crate::Writer`] stores the manifest of a run.
+const OWN_METADATA: &str = "zsim";
+const MANIFEST_KEY: &str = "manifest";
+
 /// Maximum size of a block of records outside chunks, bytes: about that of a chunk.
 const PLAIN_BLOCK_BYTES: u64 = 1 << 20;
 
 /// Indexes the MCAP file in `source`.
 ///
 /// # Errors
-/// When it cannot be read.
-pub fn index_mcap(source: &Source) -> Result<FileIndex, RecordingError> {
+/// When it cannot be read, or the budget is exhausted.
+pub fn index_mcap(source: &Source, budget: &mut Budget) -> Result<FileIndex, RecordingError> {
     let summary = mcap_summary::read(source)?;
     let mut input = source.lock();
     input.seek(SeekFrom::Start(0)).map_err(RecordingError::Read)?;
@@ -30,6 +35,7 @@ pub fn index_mcap(source: &Source) -> Result<FileIndex, RecordingError> {
         at: 0,
         summary,
         index: FileIndex::empty(),
+        budget,
         in_summary: false,
     };
     indexer.take(MAGIC.len() as u64)?;
@@ -44,6 +50,7 @@ struct McapIndexer<'a> {
     at: u64,
     summary: McapSummary,
     index: FileIndex,
+    budget: &'a mut Budget,
     in_summary: bool,
 }
 
@@ -113,39 +120,42 @@ impl McapIndexer<'_> {
             }
             op::SCHEMA | op::CHANNEL | op::METADATA if length <= MAX_RECORD_BYTES => {
                 let bytes = self.take(length)?;
-                self.definition_or_metadata(opcode, &bytes, start)
+                self.definition_or_metadata(opcode, &bytes, start)?
             }
             _ => true,
         })
     }
 
-    fn definition_or_metadata(&mut self, opcode: u8, bytes: &[u8], start: u64) -> bool {
+    fn definition_or_metadata(&mut self, opcode: u8, bytes: &[u8], start: u64) -> Result<bool, RecordingError> {
         if self.in_summary && !self.summary.is_valid {
-            return true;
+            return Ok(true);
         }
         if !self.in_summary && opcode != op::METADATA {
             // Definitions between messages outside chunks belong to the block, which is read again with them.
-            self.extend_plain(start, PREFIX + bytes.len() as u64, None);
+            self.extend_plain(start, PREFIX + bytes.len() as u64, None)?;
         }
         if opcode != op::METADATA {
-            return self.index.define(opcode, bytes);
+            return self.index.define(opcode, bytes, self.budget);
         }
-        let Some((name, map)) = record::metadata(bytes) else { return false };
-        self.index.metadata.entry(name).or_insert(map);
-        true
+        let Some((name, manifest)) = record::metadata(bytes, MANIFEST_KEY) else { return Ok(false) };
+        if let Some(manifest) = manifest.filter(|_| name == OWN_METADATA && self.index.manifest.is_none()) {
+            self.budget.item(manifest.len())?;
+            self.index.manifest = Some(manifest.to_owned());
+        }
+        Ok(true)
     }
 
     fn message(&mut self, start: u64, length: u64) -> Result<bool, RecordingError> {
         let bytes = self.take(length.min(MESSAGE_FIELDS as u64))?;
         let header = record::message_header(&bytes);
         if let Some(header) = header {
-            self.extend_plain(start, PREFIX + length, Some(header.log_time_ns));
+            self.extend_plain(start, PREFIX + length, Some(header.log_time_ns))?;
         }
         Ok(header.is_some())
     }
 
     /// Adds a record outside chunks to the adjacent block, or starts a new block.
-    fn extend_plain(&mut self, start: u64, length: u64, log_time_ns: Option<u64>) {
+    fn extend_plain(&mut self, start: u64, length: u64, log_time_ns: Option<u64>) -> Result<(), RecordingError> {
         let time = log_time_ns.unwrap_or(u64::MAX);
         match self.index.blocks.last_mut() {
             Some(block)
@@ -155,14 +165,13 @@ impl McapIndexer<'_> {
             {
                 block.length += length;
                 block.start_ns = block.start_ns.min(time);
+                Ok(())
             }
-            _ => self.index.blocks.push(Block {
-                offset: start,
-                length,
-                start_ns: time,
-                kind: BlockKind::Plain,
-                indexed: Vec::new(),
-            }),
+            _ => {
+                let block =
+                    Block { offset: start, length, start_ns: time, kind: BlockKind::Plain, indexed: Vec::new() };
+                self.index.add_block(block, self.budget)
+            }
         }
     }
 
@@ -172,13 +181,14 @@ impl McapIndexer<'_> {
         let header = record::chunk_header(&bytes)
             .filter(|header| header.header_size.checked_add(header.compressed_size).is_some_and(|size| size <= length));
         let Some(header) = header else { return Ok(false) };
-        self.index.blocks.push(Block {
+        let block = Block {
             offset: body + header.header_size,
             length: header.compressed_size,
             start_ns: header.start_ns,
-            kind: BlockKind::Chunk(header),
+            kind: BlockKind::Chunk(header.encoding),
             indexed: Vec::new(),
-        });
+        };
+        self.index.add_block(block, self.budget)?;
         Ok(true)
     }
 

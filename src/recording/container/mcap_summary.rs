@@ -2,7 +2,7 @@
 //!
 //! The chunk offsets let indexing resume after a damaged record length; the message count reveals missing messages.
 
-use super::record::{Fields, MAGIC, PREFIX, op};
+use super::record::{Fields, MAGIC, PREFIX, next_record, op};
 use super::source::Source;
 use crate::RecordingError;
 
@@ -89,13 +89,6 @@ fn parse_summary(summary: &[u8], summary_start: u64) -> McapSummary {
     parsed.chunks.sort_unstable();
     parsed.chunks.dedup();
     parsed
-}
-
-/// Reads the next record in memory: opcode and fields.
-pub fn next_record<'a>(fields: &mut Fields<'a>) -> Option<(u8, &'a [u8])> {
-    let opcode = fields.u8()?;
-    let length = usize::try_from(fields.u64()?).ok()?;
-    Some((opcode, fields.bytes(length)?))
 }
 
 fn chunk_offset(record: &[u8]) -> Option<u64> {

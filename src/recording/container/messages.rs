@@ -1,13 +1,13 @@
 //! Reads the messages of a recording in order of log time.
 
+use super::budget::Budget;
 use super::entry::Damage;
-use super::file_index::Block;
-use super::file_index::ChannelId;
+use super::file_index::{Block, ChannelId};
 use super::loaded_block::LoadedBlock;
 use super::recording_file::RecordingFile;
 use crate::RecordingError;
 use crate::wire::Payload;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 /// Maximum size of the blocks in memory, bytes.
 ///
@@ -42,11 +42,22 @@ pub struct DamagedBlock {
 pub struct Messages<'r> {
     /// Blocks not yet loaded, sorted by the time of their first message, with their position in the recording.
     pending: VecDeque<(usize, &'r RecordingFile, &'r Block)>,
-    active: Vec<ActiveBlock<'r>>,
-    spare: Vec<LoadedBlock>,
+    /// Block of the last message.
+    current: Option<ActiveBlock<'r>>,
+    /// Other blocks in memory, by their next message.
+    waiting: BTreeMap<Key, ActiveBlock<'r>>,
+    /// Memory of the blocks in memory, bytes.
+    active_bytes: usize,
+    /// Buffers of the last completely read block, and of compressed bytes.
+    spare: LoadedBlock,
+    compressed: Vec<u8>,
+    budget: Budget,
     damaged: Vec<DamagedBlock>,
     count: u64,
 }
+
+/// Log time of a message, ns, and position of its block in the recording.
+type Key = (u64, usize);
 
 struct ActiveBlock<'r> {
     position: usize,
@@ -56,34 +67,40 @@ struct ActiveBlock<'r> {
 }
 
 impl ActiveBlock<'_> {
-    fn key(&self) -> Option<(u64, usize)> {
+    fn key(&self) -> Option<Key> {
         Some((self.loaded.entries.get(self.next)?.log_time_ns, self.position))
     }
 }
 
 impl<'r> Messages<'r> {
-    /// Reads the messages of `blocks`.
-    pub fn new(blocks: impl Iterator<Item = (&'r RecordingFile, &'r Block)>) -> Self {
+    /// Reads the messages of `blocks`, within `budget`.
+    pub fn new(blocks: impl Iterator<Item = (&'r RecordingFile, &'r Block)>, budget: Budget) -> Self {
         let mut pending: Vec<_> = blocks.enumerate().map(|(position, (file, block))| (position, file, block)).collect();
         pending.sort_by_key(|(_, _, block)| block.start_ns);
-        Self { pending: pending.into(), active: Vec::new(), spare: Vec::new(), damaged: Vec::new(), count: 0 }
+        Self {
+            pending: pending.into(),
+            current: None,
+            waiting: BTreeMap::new(),
+            active_bytes: 0,
+            spare: LoadedBlock::default(),
+            compressed: Vec::new(),
+            budget,
+            damaged: Vec::new(),
+            count: 0,
+        }
     }
 
     /// Returns the next message, `None` after the last.
     ///
     /// # Errors
-    /// When the file cannot be read. Damaged blocks are skipped and counted.
+    /// When the file cannot be read, or decompresses to too much. Damaged blocks are skipped and counted.
     pub fn next(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
         self.release();
         while self.needs_next_block() {
             self.load_next()?;
         }
-        let Some(first) =
-            (0..self.active.len()).min_by_key(|k| self.active[*k].key().unwrap_or((u64::MAX, usize::MAX)))
-        else {
-            return Ok(None);
-        };
-        let active = &mut self.active[first];
+        self.select();
+        let Some(active) = &mut self.current else { return Ok(None) };
         let Some(entry) = active.loaded.entries.get(active.next) else { return Ok(None) };
         active.next += 1;
         let data = Payload { bytes: &active.loaded.bytes[entry.data.clone()], wire: active.file.wire(entry.channel) };
@@ -91,7 +108,7 @@ impl<'r> Messages<'r> {
         Ok(Some(RawMessage { channel, log_time_ns: entry.log_time_ns, data }))
     }
 
-    /// Blocks found unreadable so far.
+    /// Blocks found unreadable so far, completely or in part.
     pub fn damaged(&self) -> &[DamagedBlock] {
         &self.damaged
     }
@@ -101,39 +118,49 @@ impl<'r> Messages<'r> {
         self.count
     }
 
-    /// Releases completely read blocks.
+    /// Releases the current block if it is completely read.
     fn release(&mut self) {
-        while let Some(done) = self.active.iter().position(|active| active.key().is_none()) {
-            self.spare.push(self.active.swap_remove(done).loaded);
+        if let Some(done) = self.current.take_if(|active| active.key().is_none()) {
+            self.active_bytes -= done.loaded.size();
+            self.spare = done.loaded;
         }
-        self.spare.truncate(2);
+    }
+
+    /// Makes the block of the earliest message the current one.
+    fn select(&mut self) {
+        let current = self.current.as_ref().and_then(ActiveBlock::key);
+        if let Some(first) = self.waiting.first_entry()
+            && current.is_none_or(|key| *first.key() < key)
+        {
+            let before = self.current.replace(first.remove());
+            self.waiting.extend(current.zip(before));
+        }
     }
 
     /// Whether the next block may contain a message before those of the blocks in memory.
     fn needs_next_block(&self) -> bool {
         let Some((_, _, block)) = self.pending.front() else { return false };
-        match self.active.iter().filter_map(ActiveBlock::key).min() {
+        let current = self.current.as_ref().and_then(ActiveBlock::key);
+        match current.into_iter().chain(self.waiting.keys().next().copied()).min() {
             None => true,
-            Some((time, _)) => block.start_ns <= time && self.active_bytes() < MAX_ACTIVE_BYTES,
+            Some((time, _)) => block.start_ns <= time && self.active_bytes < MAX_ACTIVE_BYTES,
         }
-    }
-
-    fn active_bytes(&self) -> usize {
-        self.active.iter().map(|active| active.loaded.bytes.len()).sum()
     }
 
     fn load_next(&mut self) -> Result<(), RecordingError> {
         let Some((position, file, block)) = self.pending.pop_front() else { return Ok(()) };
-        let mut loaded = self.spare.pop().unwrap_or_default();
-        match loaded.load(&file.store, block)? {
-            Ok(()) => {
-                self.count += loaded.entries.len() as u64;
-                self.active.push(ActiveBlock { position, file, loaded, next: 0 });
+        let mut loaded = std::mem::take(&mut self.spare);
+        if let Err(damage) = loaded.load(&file.store, block, &mut self.compressed, &mut self.budget)? {
+            self.damaged.push(DamagedBlock { damage, bytes: block.length });
+        }
+        self.count += loaded.entries.len() as u64;
+        let active = ActiveBlock { position, file, loaded, next: 0 };
+        match active.key() {
+            Some(key) => {
+                self.active_bytes += active.loaded.size();
+                self.waiting.insert(key, active);
             }
-            Err(damage) => {
-                self.damaged.push(DamagedBlock { damage, bytes: block.length });
-                self.spare.push(loaded);
-            }
+            None => self.spare = active.loaded,
         }
         Ok(())
     }

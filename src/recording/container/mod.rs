@@ -3,10 +3,14 @@
 //! Each file is indexed as a list of blocks; messages are read in order of log time.
 //!
 //! Files may be truncated, damaged or malicious: memory is never allocated on the basis of an unchecked length field, every
-//! record is checked against the available bytes, and unreadable data are counted and skipped.
+//! record is checked against the available bytes, and unreadable data are counted and skipped. A [`budget::Budget`] limits
+//! what a recording may decompress to and keep in memory.
 
 mod bag;
+mod bag_indexer;
+mod budget;
 mod database;
+mod encoding;
 mod entry;
 mod file_index;
 mod format;
@@ -18,6 +22,7 @@ mod record;
 mod recording_file;
 mod source;
 
-pub use file_index::{Block, BlockKind, Channel, ChannelId, Ending, FileIndex};
+pub use budget::Budget;
+pub use file_index::{Block, Channel, ChannelId, Ending, FileIndex};
 pub use messages::{Messages, RawMessage};
 pub use recording_file::RecordingFile;

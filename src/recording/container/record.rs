@@ -1,6 +1,6 @@
 //! Records of the MCAP format (mcap.dev/spec, version 0): an opcode, a length, little-endian fields.
 
-use std::collections::BTreeMap;
+use super::encoding::{Compression, Encoding};
 
 /// First and last bytes of every MCAP file.
 pub const MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -94,56 +94,39 @@ impl<'a> Fields<'a> {
         let length = self.u32()? as usize;
         std::str::from_utf8(self.bytes(length)?).ok()
     }
-
-    /// Reads names and values, prefixed by their total length in bytes.
-    pub fn map(&mut self) -> Option<BTreeMap<String, String>> {
-        let length = self.u32()? as usize;
-        let mut inner = Fields::new(self.bytes(length)?);
-        let mut map = BTreeMap::new();
-        while !inner.rest.is_empty() {
-            map.insert(inner.string()?.to_owned(), inner.string()?.to_owned());
-        }
-        Some(map)
-    }
 }
 
-/// Message type definition.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SchemaRecord {
+/// Fields of a message type definition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SchemaFields<'a> {
     /// Number in the file.
     pub id: u16,
     /// Type name: `package/msg/Type`.
-    pub name: String,
+    pub name: &'a str,
     /// Whether the first field is a `std_msgs/Header`.
     pub has_header: bool,
 }
 
-/// Topic.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ChannelRecord {
+/// Fields of a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChannelFields<'a> {
     /// Number in the file.
     pub id: u16,
     /// Number of the message definition.
     pub schema: u16,
     /// Topic name.
-    pub topic: String,
+    pub topic: &'a str,
     /// Message encoding: `cdr` in the ROS 2 profile.
-    pub encoding: String,
+    pub encoding: &'a str,
 }
 
 /// Header of a chunk.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChunkHeader {
     /// Log time of the earliest message, ns.
     pub start_ns: u64,
-    /// Log time of the latest message, ns.
-    pub end_ns: u64,
-    /// Uncompressed size, bytes.
-    pub uncompressed_size: u64,
-    /// CRC-32 of the uncompressed bytes, 0 if there is none.
-    pub crc: u32,
-    /// `zstd`, `lz4` or empty.
-    pub compression: String,
+    /// Compression, uncompressed size and checksum.
+    pub encoding: Encoding,
     /// Compressed size, bytes.
     pub compressed_size: u64,
     /// Size of this header, bytes.
@@ -160,12 +143,11 @@ pub struct MessageHeader {
 }
 
 /// Reads a schema record's fields.
-pub fn schema(bytes: &[u8]) -> Option<SchemaRecord> {
+pub fn schema(bytes: &[u8]) -> Option<SchemaFields<'_>> {
     let mut fields = Fields::new(bytes);
-    let id = fields.u16()?;
-    let name = fields.string()?.to_owned();
+    let (id, name) = (fields.u16()?, fields.string()?);
     fields.string()?;
-    Some(SchemaRecord { id, name, has_header: begins_with_header(fields.string().unwrap_or_default()) })
+    Some(SchemaFields { id, name, has_header: begins_with_header(fields.string().unwrap_or_default()) })
 }
 
 /// Whether the first field of a `ros2msg` definition is a header.
@@ -176,21 +158,21 @@ pub fn begins_with_header(definition: &str) -> bool {
 }
 
 /// Reads a channel record's fields.
-pub fn channel(bytes: &[u8]) -> Option<ChannelRecord> {
+pub fn channel(bytes: &[u8]) -> Option<ChannelFields<'_>> {
     let mut fields = Fields::new(bytes);
     let (id, schema) = (fields.u16()?, fields.u16()?);
-    Some(ChannelRecord { id, schema, topic: fields.string()?.to_owned(), encoding: fields.string()?.to_owned() })
+    Some(ChannelFields { id, schema, topic: fields.string()?, encoding: fields.string()? })
 }
 
 /// Reads the header of a chunk record.
 pub fn chunk_header(bytes: &[u8]) -> Option<ChunkHeader> {
     let mut fields = Fields::new(bytes);
-    let (start_ns, end_ns) = (fields.u64()?, fields.u64()?);
-    let (uncompressed_size, crc) = (fields.u64()?, fields.u32()?);
-    let compression = fields.string()?.to_owned();
+    let (start_ns, _end_ns) = (fields.u64()?, fields.u64()?);
+    let (size, crc) = (fields.u64()?, fields.u32()?);
+    let encoding = Encoding { compression: Compression::named(fields.string()?), size, crc };
     let compressed_size = fields.u64()?;
     let header_size = (bytes.len() - fields.rest.len()) as u64;
-    Some(ChunkHeader { start_ns, end_ns, uncompressed_size, crc, compression, compressed_size, header_size })
+    Some(ChunkHeader { start_ns, encoding, compressed_size, header_size })
 }
 
 /// Reads the header of a message record.
@@ -203,8 +185,23 @@ pub fn message_header(bytes: &[u8]) -> Option<MessageHeader> {
     Some(MessageHeader { channel, log_time_ns })
 }
 
-/// Reads the fields of a metadata record: record name, then names and values.
-pub fn metadata(bytes: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
+/// Reads a metadata record: its name, and the value of `key`.
+pub fn metadata<'a>(bytes: &'a [u8], key: &str) -> Option<(&'a str, Option<&'a str>)> {
     let mut fields = Fields::new(bytes);
-    Some((fields.string()?.to_owned(), fields.map()?))
+    let (name, length) = (fields.string()?, fields.u32()? as usize);
+    let (mut map, mut found) = (Fields::new(fields.bytes(length)?), None);
+    while !map.rest.is_empty() {
+        let (key_here, value) = (map.string()?, map.string()?);
+        if key_here == key {
+            found = Some(value);
+        }
+    }
+    Some((name, found))
+}
+
+/// Reads the next record in memory: opcode and fields.
+pub fn next_record<'a>(fields: &mut Fields<'a>) -> Option<(u8, &'a [u8])> {
+    let opcode = fields.u8()?;
+    let length = usize::try_from(fields.u64()?).ok()?;
+    Some((opcode, fields.bytes(length)?))
 }

@@ -41,7 +41,7 @@ impl RecordingFile {
     /// Creates the file with the given number in the recording.
     pub fn new(number: u16, store: Store, index: FileIndex) -> Self {
         let format_of = |(id, encoding): (u16, &str)| Some((id, WireFormat::from_encoding(encoding)?));
-        let encodings = index.channels.values().map(|channel| (channel.id, channel.encoding.as_str()));
+        let encodings = index.channels.iter().map(|(id, channel)| (*id, channel.encoding.as_str()));
         let wires = encodings.filter_map(format_of).collect();
         Self { store, index, number: ChannelId::from(number), wires }
     }

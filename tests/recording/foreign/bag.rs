@@ -53,7 +53,8 @@ fn fields(pairs: &[(&str, &[u8])]) -> Vec<u8> {
     bytes
 }
 
-fn record(header: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
+/// A record with the fields `header`.
+pub fn record(header: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
     let header = fields(header);
     let mut bytes = (header.len() as u32).to_le_bytes().to_vec();
     bytes.extend(header);
@@ -86,7 +87,8 @@ fn packed(compression: &str, bytes: &[u8]) -> Vec<u8> {
     }
 }
 
-fn connection(id: usize, (topic, kind): (&str, &str)) -> Vec<u8> {
+/// A connection record.
+pub fn connection(id: usize, (topic, kind): (&str, &str)) -> Vec<u8> {
     let definition = b"# a comment\nHeader header\n";
     let inner = fields(&[
         ("topic", topic.as_bytes()),
@@ -122,9 +124,8 @@ fn chunk(topics: &[(&str, &str)], messages: &[Logged], compression: &str, positi
         let id = (*topic as u32).to_le_bytes();
         inner.extend(record(&[("op", &[2]), ("conn", &id), ("time", &time(*logged))], bytes));
     }
-    let (size, one) = ((inner.len() as u32).to_le_bytes(), 1_u32.to_le_bytes());
-    let fields: [(&str, &[u8]); 3] = [("op", &[5]), ("compression", compression.as_bytes()), ("size", &size)];
-    let (mut bytes, mut data) = (record(&fields, &packed(compression, &inner)), Vec::new());
+    let one = 1_u32.to_le_bytes();
+    let (mut bytes, mut data) = (chunk_of(&inner, compression), Vec::new());
     for (id, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
         let (id, count_bytes) = ((id as u32).to_le_bytes(), count.to_le_bytes());
         let fields: [(&str, &[u8]); 4] = [("op", &[4]), ("ver", &one), ("conn", &id), ("count", &count_bytes)];
@@ -143,6 +144,18 @@ fn chunk(topics: &[(&str, &str)], messages: &[Logged], compression: &str, positi
         ("count", &count),
     ];
     (bytes, record(&fields, &data))
+}
+
+/// A chunk with the records `inner`.
+pub fn chunk_of(inner: &[u8], compression: &str) -> Vec<u8> {
+    let size = (inner.len() as u32).to_le_bytes();
+    let header: [(&str, &[u8]); 3] = [("op", &[5]), ("compression", compression.as_bytes()), ("size", &size)];
+    record(&header, &packed(compression, inner))
+}
+
+/// A bag of `chunks` without an index.
+pub fn bag_of_chunks(chunks: &[Vec<u8>]) -> Vec<u8> {
+    [head(0, 0, 0), chunks.concat()].concat()
 }
 
 /// A bag of `topics` (name and type) with ten messages per chunk; `indexed` if `rosbag record` has closed it.
