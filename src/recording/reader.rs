@@ -163,7 +163,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Number of messages according to the summaries; `None` if a file has none, or its number cannot be right.
+    /// Number of messages according to the summaries; `None` if a file has none.
     pub(super) fn expected_messages(&self) -> Option<u64> {
         let counts = self.files.iter().map(|file| file.index.expected_messages);
         counts.reduce(|a, b| Some(a?.saturating_add(b?))).flatten()

@@ -2,6 +2,7 @@
 
 mod bags;
 mod damage;
+mod databases;
 mod drivers;
 pub mod foreign;
 mod formats;

@@ -1,12 +1,13 @@
 //! Reads rosbag2 SQLite databases: a table of topics, and one of messages in recording order.
 
 use super::budget::Budget;
+use super::database_file::open_read_only;
 use super::entry::{Damage, Entry};
 use super::file_index::{Block, BlockKind, Ending, FileIndex};
 use super::record::{ChannelFields, SchemaFields};
 use crate::RecordingError;
 use rusqlite::limits::Limit;
-use rusqlite::{Connection, OpenFlags, Row};
+use rusqlite::{Connection, Row};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -34,13 +35,10 @@ impl SqliteDatabase {
     /// Opens the database at `path`.
     ///
     /// # Errors
-    /// When it cannot be opened.
+    /// When it cannot be opened, or a transaction in it was interrupted.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let at = |source| RecordingError::File { path: path.to_owned(), source };
-        let length = std::fs::metadata(path).map_err(at)?.len();
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let opened = Connection::open_with_flags(path, flags).map_err(|error| at(std::io::Error::other(error)))?;
-        Ok(Self { database: Mutex::new(opened), length })
+        let (database, length) = open_read_only(path)?;
+        Ok(Self { database: Mutex::new(database), length })
     }
 
     /// Opens a database in memory.
@@ -54,7 +52,7 @@ impl SqliteDatabase {
         Ok(Self { database: Mutex::new(database), length: bytes.len() as u64 })
     }
 
-    /// Size of the database, bytes.
+    /// Size of the database and its log, bytes.
     pub fn length(&self) -> u64 {
         self.length
     }

@@ -10,6 +10,7 @@ mod bag;
 mod bag_indexer;
 mod budget;
 mod database;
+mod database_file;
 mod encoding;
 mod entry;
 mod file_index;
