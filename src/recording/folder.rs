@@ -3,9 +3,11 @@
 use crate::RecordingError;
 use crate::yaml::parse_yaml;
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::io::{Error, Read};
+use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
+use zsim_base::file::open_file;
 
 /// Extensions of recording files.
 const EXTENSIONS: [&str; 3] = ["mcap", "db3", "bag"];
@@ -60,7 +62,10 @@ pub fn list_files(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
 /// Files listed in `metadata.yaml`; empty if there is no such file, or it lists none.
 fn files_in_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let metadata = path.join(METADATA_FILE);
-    let Ok(file) = std::fs::File::open(&metadata) else { return Ok(Vec::new()) };
+    let file = match open_file(&metadata) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        opened => opened.map_err(|source| RecordingError::File { path: metadata.clone(), source })?,
+    };
     let mut text = String::new();
     let length = file
         .take(MAX_METADATA_BYTES + 1)
@@ -82,7 +87,11 @@ fn files_in_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let parsed: Metadata = parse_yaml(&text).map_err(|error| metadata_error(error.to_string()))?;
     let names =
         parsed.rosbag2_bagfile_information.map(|information| information.relative_file_paths).unwrap_or_default();
-    names.iter().map(|name| find_listed_file(path, name)).collect()
+    let files = names.iter().map(|name| find_listed_file(path, name)).collect::<Result<Vec<_>, _>>()?;
+    match files.iter().collect::<BTreeSet<_>>().len() {
+        different if different < files.len() => Err(metadata_error("it lists a file twice".to_owned())),
+        _ => Ok(files),
+    }
 }
 
 /// Finds the file listed as `name`.
@@ -94,7 +103,11 @@ fn find_listed_file(folder: &Path, name: &str) -> Result<PathBuf, RecordingError
     let decompressed = decompressed.map(|file| file.with_extension(""));
     [decompressed, file].into_iter().flatten().find(|file| file.is_file()).ok_or_else(|| RecordingError::Folder {
         path: folder.to_owned(),
-        problem: format!("lacks the file `{}`, which its {METADATA_FILE} lists", crate::topics::printable(name)),
+        problem: format!(
+            "lacks the file `{}`, which its {METADATA_FILE} lists; restore it, or list the other files anew with `ros2 bag reindex {}`",
+            crate::topics::printable(name),
+            folder.display()
+        ),
     })
 }
 

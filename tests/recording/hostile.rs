@@ -110,4 +110,7 @@ fn a_pipe_or_device_is_refused_by_every_reader() {
     for error in errors(Path::new("/dev/zero")) {
         assert_eq!(error, "/dev/zero: is a device, not a regular file; specify a file on disk");
     }
+    std::fs::rename(&pipe, folder.path().join("metadata.yaml")).unwrap();
+    let error = Reader::open(folder.path()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("metadata.yaml: is a FIFO (pipe)"), "{error}");
 }

@@ -276,6 +276,8 @@ fn a_folder_must_be_one_recording() {
         b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [run_0.mcap, run_1.mcap]\n",
     );
     assert!(message().unwrap_err().contains("lacks the file `run_1.mcap`, which its metadata.yaml lists"));
+    put("metadata.yaml", b"rosbag2_bagfile_information:\n  relative_file_paths: [run_0.mcap, run_0.mcap]\n");
+    assert!(message().unwrap_err().contains("it lists a file twice"));
     put("run_1.mcap.zstd", &bytes);
     put("metadata.yaml", b"rosbag2_bagfile_information:\n  relative_file_paths:\n    - run_1.mcap.zstd\n");
     assert!(message().unwrap_err().contains("decompress it with `zstd -d --rm "));
