@@ -137,7 +137,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let fifo = folder.path().join("fifo");
         assert!(std::process::Command::new("mkfifo").arg(&fifo).status().unwrap().success());
-        for (path, found) in [(folder.path(), "a folder"), (Path::new("/dev/zero"), "a device"), (&fifo, "a FIFO (pipe)")] {
+        for (path, found) in
+            [(folder.path(), "a folder"), (Path::new("/dev/zero"), "a device"), (&fifo, "a FIFO (pipe)")]
+        {
             let error = open(path).unwrap_err();
             assert_eq!(error.to_string(), format!("is {found}, not a regular file; specify a file on disk"));
         }

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use zsim_base::file::open_file;
+use zsim_base::files;
 
 /// Extensions of recording files.
 const EXTENSIONS: [&str; 3] = ["mcap", "db3", "bag"];
@@ -62,7 +62,7 @@ pub fn list_files(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
 /// Files listed in `metadata.yaml`; empty if there is no such file, or it lists none.
 fn files_in_metadata(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let metadata = path.join(METADATA_FILE);
-    let file = match open_file(&metadata) {
+    let file = match files::open(&metadata) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
         opened => opened.map_err(|source| RecordingError::File { path: metadata.clone(), source })?,
     };
