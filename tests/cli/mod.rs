@@ -12,6 +12,7 @@ mod info;
 mod live;
 mod live_run;
 mod maps;
+mod numbers;
 mod output;
 mod ros2;
 mod scene;

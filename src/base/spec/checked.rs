@@ -13,6 +13,15 @@ use std::borrow::Cow;
 /// Beyond, the single precision of the ray search is too coarse.
 pub const MAX_LENGTH_M: f64 = 100_000.0;
 
+/// Writes a number in at most some 25 characters.
+fn written(number: f64) -> String {
+    if number == 0.0 || (1e-6..1e15).contains(&number.abs()) || !number.is_finite() {
+        number.to_string()
+    } else {
+        format!("{number:e}")
+    }
+}
+
 /// Defines a checked number and the array of such numbers.
 macro_rules! checked {
     ($(#[$doc:meta])* $number:ident, $array:ident, $accepts:expr, $expected:literal, $several:literal, $schema:tt) => {
@@ -30,7 +39,7 @@ macro_rules! checked {
                 if accepts(number) {
                     Ok(number)
                 } else {
-                    Err(D::Error::custom(format!("expected {}, found {number}", $expected)))
+                    Err(D::Error::custom(format!("expected {}, found {}", $expected, written(number))))
                 }
             }
 
@@ -72,7 +81,9 @@ macro_rules! checked {
                 let numbers = <[f64; N]>::deserialize(deserializer)?;
                 let accepts: fn(f64) -> bool = $accepts;
                 match numbers.iter().find(|number| !accepts(**number)) {
-                    Some(bad) => Err(D::Error::custom(format!("expected {N} {}, found {bad} among them", $several))),
+                    Some(bad) => {
+                        Err(D::Error::custom(format!("expected {N} {}, found {} among them", $several, written(*bad))))
+                    }
                     None => Ok(numbers),
                 }
             }
