@@ -95,19 +95,19 @@ impl Folder {
             return Ok(Some(Self { path: path.to_owned(), _lock: None }));
         }
         let handle = File::open(path).with_context(|| format!("{} cannot be read", path.display()))?;
-        Ok(is_locked(lock(&handle)).then(|| Self { path: path.to_owned(), _lock: Some(handle) }))
+        Ok(is_locked(&lock(&handle)).then(|| Self { path: path.to_owned(), _lock: Some(handle) }))
     }
 }
 
 /// Whether no other process has the lock. Where the system has no such locks (some network file systems), nobody has.
-fn is_locked(result: Result<(), TryLockError>) -> bool {
+fn is_locked(result: &Result<(), TryLockError>) -> bool {
     !matches!(result, Err(TryLockError::WouldBlock))
 }
 
 /// Locks a file against other processes until it is closed; `false` when another process has locked it.
 pub(super) fn lock_file(file: &File) -> bool {
     // On Windows a lock would also exclude other handles of this process.
-    !cfg!(unix) || is_locked(file.try_lock())
+    !cfg!(unix) || is_locked(&file.try_lock())
 }
 
 /// A new file for results: `wanted`, or `wanted` with a number before its ending.

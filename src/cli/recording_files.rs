@@ -185,9 +185,10 @@ impl Drop for RecordingFiles {
     }
 }
 
-/// Whether a file is a model of a head as `zsim` writes it.
+/// Whether a file is a model of a head as `zsim` writes it; an empty one is of a run that was killed.
 fn is_head_model(path: &Path) -> bool {
-    files::open(path).and_then(std::io::read_to_string).is_ok_and(|text| text.contains("<robot name=\"zsim_head\">"))
+    let is_ours = |text: String| text.is_empty() || text.contains("<robot name=\"zsim_head\">");
+    files::open(path).and_then(std::io::read_to_string).is_ok_and(is_ours)
 }
 
 /// Whether two paths in one folder name one file, also where case does not matter.
