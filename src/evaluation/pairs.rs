@@ -260,7 +260,7 @@ mod tests {
             let largest = pairs.estimate().iter().zip(pairs.truth()).map(error).fold(0.0, f64::max);
             assert!(largest < 1.3e-5, "{largest}");
             let is_on_circle = |pose: &Pose| (pose.translation.vector.norm() - 1.0).abs() < 1e-12;
-            let of_sparse = if std::ptr::eq(estimate, &raw const sparse) { pairs.estimate() } else { pairs.truth() };
+            let of_sparse = if std::ptr::eq(estimate, &sparse) { pairs.estimate() } else { pairs.truth() };
             assert!(of_sparse.iter().all(is_on_circle), "the sparser one is not interpolated");
             assert_eq!(pairs.interpolated_over(), Some(Span::from_nanos(10_000_000)));
         }

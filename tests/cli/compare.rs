@@ -145,6 +145,14 @@ fn an_exact_truth_at_any_rate_gives_the_same_errors() {
     assert!(code == 0 && stderr.contains(note), "{stderr}");
 }
 
+/// The figures of estimate.tum against `truth`, and what is printed to stderr.
+fn compared(folder: &Path, truth: &str) -> (Value, String) {
+    let (code, out, stderr) = run(folder, &format!("compare --truth {truth} estimate.tum --json"));
+    assert_eq!(code, 0, "{truth}: {stderr}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    (found["trajectories"][0].clone(), stderr)
+}
+
 #[test]
 fn a_truth_is_read_in_the_formats_of_benchmarks() {
     let here = tempfile::tempdir().unwrap();
@@ -172,12 +180,7 @@ fn a_truth_is_read_in_the_formats_of_benchmarks() {
     write("leica0.csv", &walk_at(20, leica));
     write("rtk.tum", &walk_at(20, identity));
     write("zeros.tum", &walk_at(20, zeros));
-    let compared = |truth: &str| -> (Value, String) {
-        let (code, out, stderr) = run(here.path(), &format!("compare --truth {truth} estimate.tum --json"));
-        assert_eq!(code, 0, "{truth}: {stderr}");
-        let found: Value = serde_json::from_str(&out).unwrap();
-        (found["trajectories"][0].clone(), stderr)
-    };
+    let compared = |truth: &str| compared(here.path(), truth);
     let (expected, note) = compared("truth.tum");
     assert!(note.is_empty(), "{note}");
     for truth in ["euroc.csv", "kitti.txt --truth-times times.txt", "kitti.txt --truth-rate 20"] {
