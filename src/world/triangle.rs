@@ -5,6 +5,8 @@ use zsim_base::geometry::Vector;
 
 /// Maximum number of triangles of a scene: each needs about 450 bytes while the scene is built.
 pub(super) const MAX_TRIANGLES: usize = 10_000_000;
+/// Maximum number of vertices of a mesh: as many as its triangles can have corners.
+pub(super) const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 
 /// Three corners, m.
 pub(super) type Triangle = [Vector; 3];

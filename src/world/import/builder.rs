@@ -6,9 +6,6 @@ use crate::triangle::{MAX_TRIANGLES, Triangle};
 use std::collections::BTreeMap;
 use zsim_base::geometry::Vector;
 
-/// Maximum number of vertices of a mesh: as many as its triangles can have corners.
-pub(super) const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
-
 /// Maximum sum of the squared numbers of corners of all faces: the time for those that are not convex, some 10 s.
 const MAX_EFFORT: usize = 10_000_000_000;
 

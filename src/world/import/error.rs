@@ -1,8 +1,7 @@
 //! Errors of meshes.
 
-use super::builder::MAX_VERTICES;
 use super::polygon::FaceFault;
-use crate::triangle::MAX_TRIANGLES;
+use crate::triangle::{MAX_TRIANGLES, MAX_VERTICES};
 
 /// Maximum size of a mesh's file, and of the buffers of a glTF file together, bytes: twice the maximum number of triangles of
 /// a scene as binary STL.

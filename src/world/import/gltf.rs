@@ -5,9 +5,10 @@ mod buffers;
 mod document;
 mod error;
 
-use super::builder::{Faces, MAX_VERTICES, MeshBuilder, corners};
+use super::builder::{Faces, MeshBuilder, corners};
 use super::error::MeshError;
 use super::text::without_mark;
+use crate::triangle::MAX_VERTICES;
 use accessor::Data;
 use document::{Document, Primitive};
 use error::malformed;

@@ -3,6 +3,7 @@
 
 mod builder;
 mod error;
+mod file;
 mod gltf;
 mod obj;
 mod ply;
@@ -16,6 +17,7 @@ use super::shape::UpAxis;
 use super::triangle::Triangle;
 use builder::Faces;
 use error::MAX_BYTES;
+use file::read_file;
 use std::path::Path;
 use zsim_base::geometry::Vector;
 
@@ -63,18 +65,6 @@ pub(super) fn read(path: &Path, scale: f64, up: Option<UpAxis>) -> Result<MeshTr
         faces.triangles.iter_mut().flatten().for_each(|corner| *corner = Vector::new(corner.x, -corner.z, corner.y));
     }
     check(faces, scale)
-}
-
-/// Reads a regular file of at most `max_bytes`; devices and pipes, which may have no end, are refused.
-fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>, MeshError> {
-    let meta = std::fs::metadata(path)?;
-    if !meta.is_file() {
-        return Err(MeshError::Io(std::io::Error::other("it is not a file")));
-    }
-    if meta.len() > max_bytes {
-        return Err(MeshError::TooLarge(meta.len()));
-    }
-    Ok(std::fs::read(path)?)
 }
 
 /// A file format: parser and default up axis.

@@ -1,10 +1,10 @@
 //! Wavefront OBJ: vertices (`v`), faces (`f`) and names of materials (`usemtl`); other statements are ignored.
 
-use super::builder::{Faces, MAX_VERTICES, MeshBuilder, corners};
+use super::builder::{Faces, MeshBuilder, corners};
 use super::error::MeshError;
 use super::polygon::MAX_CORNERS;
 use super::text;
-use crate::triangle::MAX_TRIANGLES;
+use crate::triangle::{MAX_TRIANGLES, MAX_VERTICES};
 use std::borrow::Cow;
 use zsim_base::geometry::Vector;
 
@@ -56,9 +56,7 @@ fn built(vertices: &[Vector], indices: &[i64], statements: Vec<Statement>) -> Re
     let (mut mesh, mut start) = (MeshBuilder::default(), 0);
     for statement in statements {
         match statement {
-            Statement::Material(name) => {
-                mesh.set_material(Some(&name).filter(|name| !name.is_empty()).map(|name| &**name))?
-            }
+            Statement::Material(name) => mesh.set_material((!name.is_empty()).then_some(name.as_str()))?,
             Statement::Face(end) => {
                 mesh.polygon(&corners(vertices, &indices[start..end], mesh.next_face())?)?;
                 start = end;

@@ -1,7 +1,8 @@
 //! PLY, ASCII and binary: the elements `vertex` (x, y, z) and `face` (`vertex_indices` or `vertex_index`).
 
-use super::builder::{Faces, MAX_VERTICES, MeshBuilder, corners};
+use super::builder::{Faces, MeshBuilder, corners};
 use super::error::MeshError;
+use crate::triangle::MAX_VERTICES;
 use zsim_base::geometry::Vector;
 use zsim_base::ply::{Element, Failure, PlyReader, Row};
 

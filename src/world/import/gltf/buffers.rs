@@ -3,7 +3,7 @@
 use super::document::Buffer;
 use super::error::malformed;
 use crate::import::error::{MAX_BYTES, MeshError};
-use crate::import::read_file;
+use crate::import::file::read_file;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
