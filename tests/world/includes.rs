@@ -102,7 +102,7 @@ fn an_error_of_an_included_file_does_not_show_its_content() {
         let scene = GUEST.replace("\"hall\"", &format!("\"{name}\""));
         let message = fault(&[(name, "password: swordfish\n"), ("guest.ron", &scene)], "guest.ron");
         assert!(
-            message.contains("guest.ron:3:") && message.contains(name) && message.contains("must end in .ron"),
+            message.contains("guest.ron:3:") && message.contains(name) && message.contains("does not end in .ron"),
             "{message}"
         );
         assert!(!message.contains("password") && !message.contains("swordfish"), "{message}");

@@ -159,7 +159,7 @@ fn found(kind: Kind, name: &str) -> Result<Option<Source>, SpecError> {
     let built_in = built_in(kind, &file);
     if built_in.is_none() && Path::new(name).is_file() {
         // A spec can name any file of the machine, and an error about a spec quotes a line of it.
-        let message = format!("is not a {}: the name of its file must end in .ron", kind.noun());
+        let message = format!("its name does not end in .ron, so it is not read as a {}", kind.noun());
         return Err(SpecError::plain(name, message));
     }
     Ok(built_in)
