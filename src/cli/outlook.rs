@@ -34,8 +34,8 @@ impl Outlook {
         let selection = match reader.select(&TopicPreference::default()) {
             Ok(selection) => selection,
             Err(error) => {
-                let (unused, notes, refused) = (Vec::new(), Vec::new(), Some(error.to_string()));
-                return Ok(Self { lidar: None, imu: None, unused, notes, refused });
+                let refused = Some(problem_of(reader, &error));
+                return Ok(Self { lidar: None, imu: None, unused: Vec::new(), notes: Vec::new(), refused });
             }
         };
         let calibration = recording_calibration(reader, &selection, &CalibrationSpec::default());
@@ -53,7 +53,7 @@ impl Outlook {
                 let needed_s = zsim_estimation::load("default").map(|spec: EstimatorSpec| 2.0 * spec.step_s)?;
                 too_short(info, &selection, needed_s)
             }
-            Err(error) => Some(error.to_string()),
+            Err(error) => Some(problem_of(reader, error)),
         };
         let Selection { lidar_topic, lidar_frame, imu_topic, imu_frame, unused, .. } = selection;
         let lidar = Some(Sensor { topic: lidar_topic, frame: lidar_frame });
@@ -61,7 +61,7 @@ impl Outlook {
         Ok(Self { lidar, imu, unused, notes, refused })
     }
 
-    /// The sensors, the notes, and a last line that states whether the recording can be used.
+    /// Returns the sensors, the notes, and last whether the recording can be used.
     pub fn text(&self) -> String {
         let sensor = |name: &str, sensor: &Option<Sensor>| {
             sensor.as_ref().map(|Sensor { topic, frame }| format!("{name}: {topic}, frame {frame}"))
@@ -79,6 +79,12 @@ impl Outlook {
     }
 }
 
+/// Returns the text of an error without the recording's name, printed above.
+fn problem_of(reader: &Reader, error: &dyn std::error::Error) -> String {
+    let text = error.to_string();
+    text.strip_prefix(&format!("{}: ", reader.name())).unwrap_or(&text).to_owned()
+}
+
 /// Maximum length of a word, characters: longer names are cut.
 const MAX_WORD: usize = 200;
 
@@ -91,7 +97,9 @@ fn cut(line: &str) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Why the sensors have too little time in common, by the stamps of their first and last messages.
+/// States that the sensors have too little time in common, if so.
+///
+/// The stamps of their first and last messages decide.
 fn too_short(info: &RecordingInfo, selection: &Selection, needed_s: f64) -> Option<String> {
     let topic = |name: &str| info.topics.iter().find(|topic| topic.topic == name);
     let (lidar, imu) = (topic(&selection.lidar_topic)?, topic(&selection.imu_topic)?);
@@ -109,7 +117,9 @@ fn too_short(info: &RecordingInfo, selection: &Selection, needed_s: f64) -> Opti
     })
 }
 
-/// Stamps of the first and the last message of a topic, s; clock and log time differ by `offset_s`.
+/// Returns the first and the last stamp of a topic, s.
+///
+/// They differ from the log times by `offset_s`.
 fn span_s(topic: &TopicInfo, offset_s: f64) -> Option<(f64, f64)> {
     let stamp_s = |log_ns: i64| log_ns as f64 * 1e-9 + offset_s;
     Some((stamp_s(topic.first_log_ns?), stamp_s(topic.last_log_ns?)))

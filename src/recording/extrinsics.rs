@@ -26,7 +26,9 @@ pub struct FoundCalibration {
     pub body_frame: String,
     /// Whether the poses are from the recording's transforms; otherwise they are the defaults.
     pub from_recording: bool,
-    /// Where the poses are from if not from `/tf_static`, and transforms that are not usable and not needed, one sentence each.
+    /// Source of the poses if not `/tf_static`, and broken frames that are not needed.
+    ///
+    /// One sentence each.
     pub notes: Vec<String>,
 }
 
@@ -44,7 +46,9 @@ impl Frames {
         self.0.values().all(FrameTree::is_empty)
     }
 
-    /// Computes `target_from_source` by the first tree that connects the frames; `None` if none does.
+    /// Computes `target_from_source` by the first tree that connects the frames.
+    ///
+    /// `None` if none does.
     ///
     /// # Errors
     /// When a transform between them is not usable: which, and why.
@@ -161,7 +165,9 @@ struct Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    /// The poses by the first tree of static transforms that connects the sensors; else why the first one does not, if there is one.
+    /// Finds the poses by the first tree of static transforms that connects the sensors.
+    ///
+    /// The error is why the first tree does not, if there is one.
     fn of_static(&self, frames: &Frames) -> Result<FoundCalibration, Option<String>> {
         let mut trees: Vec<_> = frames.0.iter().filter(|(_, tree)| !tree.is_empty()).collect();
         let is_of_lidar = |topic: &str| self.selection.lidar_topic.starts_with(topic.trim_end_matches(STATIC));
@@ -182,8 +188,9 @@ impl Wanted<'_> {
         Err(refusal)
     }
 
-    /// The poses by transforms of `repeated` that do not change, with the static ones of the same namespace; else why they are
-    /// not usable, if they join the sensors.
+    /// Finds the poses by transforms of `repeated` that do not change.
+    ///
+    /// Static transforms of the same namespace belong to them. The error is why they are not usable, if they join the sensors.
     fn of_repeated(
         &self,
         frames: &Frames,
@@ -213,7 +220,9 @@ impl Wanted<'_> {
         Err(refusal)
     }
 
-    /// The poses by a tree; `origin` states where it is from, `problems` which of its transforms are not usable.
+    /// Finds the poses by a tree.
+    ///
+    /// `origin` states where it is from, `problems` which of its transforms are not usable.
     fn poses(
         &self,
         tree: &FrameTree,

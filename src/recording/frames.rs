@@ -11,7 +11,7 @@ const MAX_FRAMES: usize = 10_000;
 /// Maximum number of problems that are listed.
 const MAX_LISTED: usize = 8;
 
-/// A transform that changes by more than this, m or rad, moves; rounding to 32 bits changes it by less.
+/// Minimum change of a transform that moves, m or rad: more than rounding to 32 bits.
 const MOVING: f64 = 1e-4;
 
 /// Transform of a frame to its parent.
@@ -30,7 +30,9 @@ pub(super) struct FrameTree {
     parents: BTreeMap<String, BTreeMap<String, Edge>>,
 }
 
-/// The frames above a frame: each with the pose of the frame in it, from the frame itself on, and what ends the list before the root.
+/// The frames above a frame, from itself on, each with the pose of the frame in it.
+///
+/// A problem ends the list before the root.
 struct Ancestors<'a> {
     frames: Vec<(&'a str, Pose)>,
     problem: Option<String>,

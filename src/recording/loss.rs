@@ -46,7 +46,7 @@ pub struct Loss {
 pub struct OtherFrame {
     /// Topic name.
     pub topic: String,
-    /// Frame; of many frames the last ones count as one, `other frames`.
+    /// Frame; the last of many frames count as one, `other frames`.
     pub frame: String,
     /// Number of messages.
     pub messages: u64,

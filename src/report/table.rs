@@ -7,7 +7,9 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle
 /// Row names that are narrower are not worth whole numbers.
 const MIN_NAME_WIDTH: usize = 12;
 
-/// Maximum length of a cell, characters: a longer one is cut. The time of the layout grows with the square of the length.
+/// Maximum length of a cell, characters: a longer one is cut.
+///
+/// The time of the layout grows with the square of the length.
 const MAX_CELL: usize = 200;
 
 /// Formats a table for the terminal, without rules between rows.
@@ -47,7 +49,9 @@ fn cut(cell: &str) -> String {
     if end == cell.len() { cell.to_owned() } else { format!("{}\u{2026}", &cell[..end]) }
 }
 
-/// Keeps names, `numbers` and the words above them on one line as far as the width permits: a broken number would be read as two.
+/// Keeps names, `numbers` and the words above them whole as far as the width permits.
+///
+/// A broken number would be read as two.
 fn keep_whole(table: &mut Table, header: &[&str], rows: &[Vec<String>], numbers: bool, padding: u16) {
     let limit = room(table.column_count());
     let names = table.column_max_content_widths().first().map_or(0, |width| usize::from(*width));

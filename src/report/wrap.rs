@@ -28,7 +28,7 @@ pub fn wrapped(text: &str, indent: &str) -> String {
     lines
 }
 
-/// Splits a line where it may be broken: at spaces, but not between a number and the word after it.
+/// Splits a line at spaces, but not between a number and the word after it.
 fn unbroken(line: &str) -> impl Iterator<Item = &str> {
     let is_number = |word: &str| {
         let unsigned = word.trim_start_matches(['+', '-', '\u{2212}', '(']);

@@ -13,8 +13,10 @@ fn record(path: &Path, seconds: i64, shift_s: i64, sensors: [&str; 2]) {
         let ns = 1_700_000_000_000_000_000 + k * 10 * MS;
         foreign.message(sensors[1], IMU, ns, &imu(ns, "imu"));
         if k % 10 == 0 {
+            // Equal scans would be duplicates.
+            let ranges = vec![2.0 + 0.01 * k as f32; 10];
             let stamp = header(ns + shift_s * 1_000_000_000, "laser");
-            foreign.message(sensors[0], SCAN, ns, &LaserScan { header: stamp, ..scan(ns, 0.001, 0.1) });
+            foreign.message(sensors[0], SCAN, ns, &LaserScan { header: stamp, ranges, ..scan(ns, 0.001, 0.1) });
         }
     }
     foreign.writer.finish().unwrap();
@@ -45,7 +47,7 @@ fn the_last_line_states_what_an_estimate_would_do() {
         |name: &str| run(here.path(), &format!("--quiet estimate {name} --out x --force --metrics-only --open-loop")).2;
     assert!(!estimate("run.mcap").contains("in common"));
     let (refused, _) = ending(0, 0, ["/scan", "/imu"]);
-    assert!(refused.starts_with("zsim estimate: refused: run.mcap: no lidar in the recording"), "{refused}");
+    assert!(refused.starts_with("zsim estimate: refused: no lidar in the recording"), "{refused}");
     let (json, _) = (run(here.path(), "info run.mcap --json").1, ());
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert!(json["estimate"]["refused"].as_str().unwrap().contains("no lidar"), "{json}");

@@ -88,8 +88,9 @@ fn raw_data_are_refused_with_the_driver_that_converts_them() {
         foreign.message("/imu", IMU, 0, &imu(0, "imu"));
         foreign.serialised("/driver/packets", kind, 0, &[0, 1, 0, 0, 1, 2, 3]);
         let error = refused(&foreign.reader());
-        let expected = format!("/driver/packets has raw data ({kind}): play the recording into {driver}");
-        assert!(error.contains("no lidar in the recording") && error.contains(&expected), "{error}");
+        let expected = format!("/driver/packets has raw data ({kind}): play the recording into ");
+        let parts = ["no lidar in the recording", &expected, driver];
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
     }
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     foreign.message("/imu", IMU, 0, &imu(0, "imu")).serialised("/image", "sensor_msgs/msg/Image", 0, &[0, 1, 0, 0]);

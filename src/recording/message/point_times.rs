@@ -12,8 +12,9 @@ pub use unit::TimeUnit;
 use zsim_base::measurement::{LidarReturn, LidarScan};
 use zsim_base::time::{Span, Stamp};
 
-/// A point whose time differs from the median of its cloud by more than this many durations of a cloud has an impossible time:
-/// the returns of a cloud may be concentrated at one of its ends.
+/// Maximum difference of a time from the median of its cloud, in durations of a cloud.
+///
+/// The returns of a cloud may be concentrated at one of its ends.
 const REACH: f64 = 1.5;
 
 /// Returns of a cloud with their times as the driver wrote them.
@@ -57,17 +58,19 @@ pub enum PointTimes {
 }
 
 impl PointTimes {
-    /// Detects the times of a lidar from its first clouds with returns: what holds for most of them; `None` without clouds.
+    /// Detects the times of a lidar: what holds for most of its first clouds.
+    ///
+    /// `None` without clouds.
     ///
     /// The second result is the unit of times after the stamp, if it is not the usual one.
     pub fn detect(clouds: &[CloudTimes]) -> Option<(Self, Option<TimeUnit>)> {
-        let source = most_frequent(clouds.iter().map(|cloud| cloud.source).collect())?;
+        let source = most_frequent(&clouds.iter().map(|cloud| cloud.source).collect::<Vec<_>>())?;
         let of_source = || clouds.iter().filter(|cloud| cloud.source == source);
         let equal: Vec<bool> = of_source().filter_map(|cloud| cloud.is_equal).collect();
         if !equal.is_empty() && equal.iter().all(|is_equal| *is_equal) {
             return Some((Self::AtStamp, None));
         }
-        let usual = most_frequent(of_source().map(TimeEncoding::detect).collect())?;
+        let usual = most_frequent(&of_source().map(TimeEncoding::detect).collect::<Vec<_>>())?;
         let same: Vec<CloudTimes> = of_source().filter(|cloud| TimeEncoding::detect(cloud) == usual).copied().collect();
         let unit = if let TimeEncoding::AfterStamp(unit) = usual { TimeUnit::detect(&same, unit) } else { None };
         let encoding = unit.map_or(usual, TimeEncoding::AfterStamp);
@@ -137,7 +140,7 @@ fn keep_near_median(returns: &mut Vec<LidarReturn>, reach: Span) {
 }
 
 /// The most frequent of `items`; of several the first.
-fn most_frequent<T: PartialEq + Copy>(items: Vec<T>) -> Option<T> {
+fn most_frequent<T: PartialEq + Copy>(items: &[T]) -> Option<T> {
     let count = |item: &&T| items.iter().filter(|other| other == item).count();
     items.iter().rev().max_by_key(count).copied()
 }

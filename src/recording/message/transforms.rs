@@ -46,7 +46,7 @@ pub struct ReadTransform {
     pub parent_from_child: Result<Pose, DecodeError>,
 }
 
-/// Whether messages of the type `name` are transforms; tf 1 wrote the same message by another name.
+/// Whether messages of the type `name` are transforms; tf 1 had another name.
 pub fn is_type(name: &str) -> bool {
     MessageType::Transforms.is_named(name) || name == "tf/tfMessage" || name == "tf/msg/tfMessage"
 }

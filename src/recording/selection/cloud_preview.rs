@@ -12,7 +12,7 @@ const MAX_MESSAGES: usize = 1000;
 /// What the first clouds of a lidar show.
 #[derive(Debug, Default)]
 pub struct CloudPreview {
-    /// How to convert the points' times; `None` for a lidar without clouds, or if no cloud has returns.
+    /// How to convert the points' times; `None` if no cloud has returns.
     pub times: Option<PointTimes>,
     /// Unit of times after the stamp, if it is not the usual one.
     pub unusual_unit: Option<TimeUnit>,

@@ -3,7 +3,7 @@
 use crate::container::Channel;
 use std::collections::BTreeMap;
 
-/// Types of messages that contain raw data of a sensor, by package and type, and what converts them.
+/// Package and type of messages with raw data of a sensor, and what converts them.
 ///
 /// A type of `*` is any type of the package.
 const DRIVERS: [(&str, &str, &str); 22] = [

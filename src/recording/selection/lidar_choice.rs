@@ -3,7 +3,9 @@
 use super::candidates::{BeamTimes, Candidate, LidarKind};
 use super::unused::UnusedTopic;
 
-/// Selects the best of `lidars`, and states why the others are not used; `None` if there is none.
+/// Selects the best of `lidars`, and states why the others are not used.
+///
+/// `None` if there is none.
 ///
 /// A lidar with returns is preferred, then one that is connected to the IMU, then beam times that each message states, then a
 /// planar scan, then the first topic by name.

@@ -27,7 +27,7 @@ fn clouds(name: &str, kind: u8, time: impl Fn(i64, usize) -> Vec<u8>) -> Reader 
     for n in 0..CLOUDS {
         let start_ns = START_NS + n * 100 * MS;
         let point = |k: usize| {
-            let xyz = [1.0 + k as f32 * 1e-3, 2.0, 3.0].map(f32::to_le_bytes).concat();
+            let xyz = [x_m(n, k), 2.0, 3.0].map(f32::to_le_bytes).concat();
             [xyz, time(n, k)].concat()
         };
         let points: Vec<_> = (0..POINTS_EACH).map(point).collect();
@@ -37,6 +37,11 @@ fn clouds(name: &str, kind: u8, time: impl Fn(i64, usize) -> Vec<u8>) -> Reader 
         foreign.message("/points", POINTS, start_ns, &point_cloud(start_ns, fields, step, &points));
     }
     foreign.reader()
+}
+
+/// Coordinate of point `k` of cloud `n`: equal clouds would be duplicates.
+fn x_m(n: i64, k: usize) -> f32 {
+    1.0 + 0.1 * n as f32 + 0.001 * k as f32
 }
 
 /// Time of point `k` after the start of its cloud, ns.
@@ -136,7 +141,7 @@ fn times_in_two_words_are_read() {
         for n in 0..CLOUDS {
             let point = |k: usize| {
                 let (first, second) = pair(n, k);
-                let xyz = [1.0 + k as f32 * 1e-3, 2.0, 3.0].map(f32::to_le_bytes).concat();
+                let xyz = [x_m(n, k), 2.0, 3.0].map(f32::to_le_bytes).concat();
                 [xyz, first.to_le_bytes().to_vec(), second.to_le_bytes().to_vec()].concat()
             };
             let points: Vec<_> = (0..POINTS_EACH).map(point).collect();
@@ -178,7 +183,7 @@ fn equal_and_missing_times_are_reported_with_the_fields() {
     let mut foreign = Foreign::new(mcap::WriteOptions::new());
     for n in 0..CLOUDS {
         let start_ns = START_NS + n * 100 * MS;
-        let point = |k: usize| [[1.0 + k as f32 * 1e-3, 2.0, 3.0].map(f32::to_le_bytes).concat(), time(n, k)].concat();
+        let point = |k: usize| [[x_m(n, k), 2.0, 3.0].map(f32::to_le_bytes).concat(), time(n, k)].concat();
         let points: Vec<_> = (0..POINTS_EACH).map(point).collect();
         let fields: Fields<'_> = &[
             ("x", 0, FLOAT32),
@@ -201,7 +206,7 @@ fn times_of_points_without_a_return_decide_nothing() {
         let start_ns = START_NS + n * 100 * MS;
         let point = |k: usize| {
             let (x, time_s) = match k % 3 {
-                0 => (1.0 + k as f32 * 1e-3, (start_ns + after_ns(k)) as f64 * 1e-9),
+                0 => (x_m(n, k), (start_ns + after_ns(k)) as f64 * 1e-9),
                 1 => (f32::NAN, 0.0),
                 _ => (f32::NAN, -5e17),
             };
@@ -233,7 +238,7 @@ fn impossible_times_of_livox_points_are_dropped_and_counted() {
         let point = |k: usize| CustomPoint {
             // An offset below 0 that wrapped around.
             offset_time: if (11..31).contains(&k) { u32::MAX - 690_605_371 } else { after_ns(k) as u32 },
-            xyz: [1.0 + k as f32 * 1e-3, 2.0, 3.0],
+            xyz: [x_m(n, k), 2.0, 3.0],
             reflectivity_tag_line: [9, 0, 1],
         };
         let message = CustomMsg {

@@ -4,7 +4,7 @@ use super::RawCloud;
 use crate::quantile::quantile;
 use zsim_base::time::Stamp;
 
-/// Fraction of a cloud's times that is ignored at each end: a few impossible times decide nothing.
+/// Fraction of a cloud's times ignored at each end: a few impossible ones decide nothing.
 const IGNORED: f64 = 0.1;
 
 /// Times of the returns of a cloud, as written.

@@ -84,7 +84,9 @@ impl TimeEncoding {
         }
     }
 
-    /// Time of a point after `stamp`, or on another clock after `reference`; `None` if it is not finite or too far from it.
+    /// Computes the time of a point after `stamp`, or on another clock after `reference`.
+    ///
+    /// `None` if it is not finite or too far from it.
     pub fn offset(self, number: f64, stamp: Stamp, reference: f64) -> Option<Span> {
         let offset = match self {
             Self::AfterStamp(TimeUnit::NANOSECOND) => Span::from_nanos(number.round() as i64),

@@ -8,7 +8,7 @@ pub const UINT32: u8 = 6;
 /// `PointField.FLOAT32`.
 pub const FLOAT32: u8 = 7;
 
-/// Names of the data types, in the order of their codes from 1 on; the last three are those of PCL.
+/// Names of the data types by code, from 1 on; the last three are those of PCL.
 const TYPE_NAMES: [&str; 11] =
     ["int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64", "int64", "uint64", "bool"];
 

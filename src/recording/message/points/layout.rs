@@ -16,7 +16,7 @@ const MAX_LISTED: usize = 20;
 pub struct Cloud<'a> {
     pub stamp: Stamp,
     pub big_endian: bool,
-    /// Length of a row according to the message, bytes, if it contradicts width, height and data and is not used.
+    /// Length of a row that the message states, bytes, if it contradicts the data.
     pub wrong_row_step: Option<usize>,
     fields: Vec<Field<'a>>,
     width: usize,
@@ -90,7 +90,7 @@ impl<'a> Cloud<'a> {
         TimeField::find(&self.fields, source, self.point_step, self.big_endian)
     }
 
-    /// Finds the first time field that is not the same in all points with coordinates, else the first; `None` without one.
+    /// Finds the first time field that is not the same in all returns, else the first.
     pub fn time_source(&self) -> Option<usize> {
         let sources = || (0..TIME_NAMES.len()).filter_map(|source| Some((source, self.time_field(source)?)));
         let coordinates = self.coordinates().ok()?;

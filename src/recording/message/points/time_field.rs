@@ -43,7 +43,9 @@ pub struct TimeField<'a> {
 }
 
 impl<'a> TimeField<'a> {
-    /// Finds the field that the name number `source` of [`TIME_NAMES`] denotes, if it can be read from points of `step` bytes.
+    /// Finds the field with the name number `source` of [`TIME_NAMES`].
+    ///
+    /// `None` if it cannot be read from points of `step` bytes.
     pub fn find(fields: &[Field<'a>], source: usize, step: usize, big_endian: bool) -> Option<Self> {
         let name = TIME_NAMES.get(source)?;
         let named = |ending: &str| {
@@ -64,7 +66,9 @@ impl<'a> TimeField<'a> {
         })
     }
 
-    /// A field of this name. Two 32-bit integers are the halves of a 64-bit integer in the byte order of the cloud.
+    /// Interprets a field; two 32-bit words are a 64-bit integer.
+    ///
+    /// Its lower half is first, except in big-endian clouds.
     fn whole(field: Field<'a>, step: usize, big_endian: bool) -> Self {
         let at = |offset: usize| Field { offset, kind: UINT32, ..field };
         let (first, second) = (at(field.offset), at(field.offset.saturating_add(4)));
