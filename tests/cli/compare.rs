@@ -240,7 +240,7 @@ fn a_truth_that_cannot_be_read_is_an_error_with_file_line_and_remedy() {
         ("columns.csv", 1, "columns.csv:1: a line needs `t, x, y, z` or"),
         ("mixed.tum", 1, "mixed.tum:2: this pose has an attitude, and the poses before it have none"),
         ("back.csv", 1, "back.csv:2: the stamp 1 ns is not later than the previous stamp 2 ns"),
-        ("/dev/zero", 1, "/dev/zero: is not a regular file"),
+        ("/dev/zero", 1, "/dev/zero: is a device, not a regular file"),
     ] {
         let (found, _, stderr) = run(here.path(), &format!("compare --truth {truth} a.tum"));
         assert!(found == code && stderr.contains(words), "{truth}: {found} {stderr}");

@@ -45,7 +45,8 @@ fn the_last_line_states_what_an_estimate_would_do() {
     // The recordings of an estimate agree.
     let estimate =
         |name: &str| run(here.path(), &format!("--quiet estimate {name} --out x --force --metrics-only --open-loop")).2;
-    assert!(!estimate("run.mcap").contains("in common"));
+    let error = estimate("run.mcap");
+    assert!(!error.contains("in common"), "{error}");
     let (refused, _) = ending(0, 0, ["/scan", "/imu"]);
     assert!(refused.starts_with("zsim estimate: refused: no lidar in the recording"), "{refused}");
     let (json, _) = (run(here.path(), "info run.mcap --json").1, ());
@@ -73,12 +74,15 @@ fn numbers_stay_with_their_units_whatever_the_path() {
 }
 
 #[test]
-fn a_name_of_megabytes_is_cut() {
+fn a_long_name_is_cut_and_one_of_megabytes_refused() {
     let here = tempfile::tempdir().unwrap();
-    let name = format!("/{}", "n".repeat(4 << 20));
-    record(&here.path().join("run.mcap"), 1, 0, ["/scan", &name]);
-    let (code, text, _) = run(here.path(), "info run.mcap");
-    assert!(code == 0 && text.len() < 10_000, "{} characters", text.len());
+    let name = |length: usize| format!("/{}", "n".repeat(length));
+    record(&here.path().join("huge.mcap"), 1, 0, ["/scan", &name(4 << 20)]);
+    let (code, _, error) = run(here.path(), "info huge.mcap");
+    assert!(code == 1 && error.contains("exceeds 4096 bytes") && error.len() < 1000, "{error}");
+    record(&here.path().join("run.mcap"), 1, 0, ["/scan", &name(4000)]);
+    let (code, text, error) = run(here.path(), "info run.mcap");
+    assert!(code == 0 && text.len() < 10_000, "{} characters: {error}", text.len());
     assert!(text.contains('\u{2026}'), "{text}");
     let (_, _, error) = run(here.path(), "estimate run.mcap --out x --lidar-topic /none");
     assert!(error.len() < 10_000, "{} characters", error.len());

@@ -36,8 +36,8 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
         }
         let wrong = |message: String| {
             // Without the line itself: the spec can name any file of the machine.
-            let message = format!("line {}: {message}", index + 1);
-            SpecError::plain(&file.name, message).with_help("one arrival time a line, s, in order; `#` before comments")
+            let place = format!("{}:{}", file.name, index + 1);
+            SpecError::plain(&place, message).with_help("one arrival time a line, s, in order; `#` before comments")
         };
         let last = arrivals_s.last().copied().unwrap_or(0.0);
         match number.parse::<f64>() {
