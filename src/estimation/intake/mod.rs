@@ -66,6 +66,8 @@ pub(super) struct Intake {
     /// Number of clipped samples in the last report.
     clipped_reported: usize,
     next_start_s: f64,
+    /// First and last stamp of the samples and of the scans, s.
+    spans: [Option<(f64, f64)>; 2],
     /// The next segment is the first after an IMU gap that is not bridged.
     after_gap: bool,
     /// The lidar gap is so long, or the IMU so uncertain in it, that the estimate waits for the next scan.
@@ -88,6 +90,7 @@ impl Intake {
             scans: ScanQueue::new(spec, calibration),
             clipped_reported: 0,
             next_start_s: 0.0,
+            spans: [None; 2],
             after_gap: false,
             without_lidar: false,
             uncertainty: PositionUncertainty::default(),
@@ -146,11 +149,13 @@ impl Intake {
         match measurement {
             Measurement::Imu(sample) => {
                 let seconds = sample.stamp.seconds_since(*self.origin.get_or_insert(sample.stamp));
+                extend(&mut self.spans[0], seconds);
                 self.samples.push(seconds, sample);
                 Ok(())
             }
             Measurement::Lidar(scan) => {
                 let seconds = scan.stamp.seconds_since(*self.origin.get_or_insert(scan.stamp));
+                extend(&mut self.spans[1], seconds);
                 self.scans.push(seconds, scan)
             }
         }
@@ -313,11 +318,17 @@ impl Intake {
         }
     }
 
-    /// Length of time that the queues of both sensors cover, s.
+    /// Length of time that the measurements of both sensors cover, s.
     pub(super) fn common_s(&self) -> f64 {
-        let common = self.samples.span().zip(self.scans.span());
+        let common = self.spans[0].zip(self.spans[1]);
         common.map_or(0.0, |(imu, lidar)| (imu.1.min(lidar.1) - imu.0.max(lidar.0)).max(0.0))
     }
+}
+
+/// Extends a span to `seconds`.
+fn extend(span: &mut Option<(f64, f64)>, seconds: f64) {
+    let (first, last) = span.get_or_insert((seconds, seconds));
+    (*first, *last) = (first.min(seconds), last.max(seconds));
 }
 
 /// Whether the head turns by more than noise during the intervals.
