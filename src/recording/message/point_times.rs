@@ -2,12 +2,14 @@
 
 mod cloud_times;
 mod encoding;
+mod raw_cloud;
 mod unit;
 
 use crate::message::scan::sort_by_firing_time;
 use crate::quantile::quantile;
 pub use cloud_times::CloudTimes;
 use encoding::{MAX_CLOUD_S, TimeEncoding};
+pub use raw_cloud::{RawCloud, TimedScan};
 pub use unit::TimeUnit;
 use zsim_base::measurement::{LidarReturn, LidarScan};
 use zsim_base::time::{Span, Stamp};
@@ -16,30 +18,6 @@ use zsim_base::time::{Span, Stamp};
 ///
 /// The returns of a cloud may be concentrated at one of its ends.
 const REACH: f64 = 1.5;
-
-/// Returns of a cloud with their times as the driver wrote them.
-#[derive(Debug, Default)]
-pub struct RawCloud {
-    /// Stamp of the cloud.
-    pub stamp: Stamp,
-    /// Returns without times.
-    pub returns: Vec<LidarReturn>,
-    /// Time of each return; empty if the points have no times.
-    pub times: Vec<f64>,
-    /// Number of the name of the time field.
-    pub source: usize,
-    /// Whether the times are too short for times since 1970.
-    pub is_short: bool,
-}
-
-/// Scan, and the number of returns that were dropped.
-#[derive(Debug)]
-pub struct TimedScan {
-    /// The scan with the remaining returns.
-    pub scan: LidarScan,
-    /// Returns dropped because their time is impossible.
-    pub impossible_times: u64,
-}
 
 /// How to convert the times of a lidar's points.
 #[derive(Debug, Clone, Copy, PartialEq)]

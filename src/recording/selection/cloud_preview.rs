@@ -1,7 +1,7 @@
 //! First clouds of a lidar, from which the encoding of the points' times is detected.
 
-use super::PREVIEW_MESSAGES;
 use super::candidates::LidarKind;
+use super::preview::PREVIEW_MESSAGES;
 use crate::message::point_times::{CloudTimes, PointTimes, RawCloud, TimeUnit};
 use crate::message::{livox, points};
 use crate::{Reader, RecordingError};

@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 use zsim_base::measurement::ImuSample;
 use zsim_base::time::Stamp;
 
+/// Clouds from which the encoding of point times is detected, and scans whose duration is measured: enough for a median.
+pub const PREVIEW_MESSAGES: usize = 20;
+
 /// Length of the preview, s of log time: above the 10 s that prove the absence of gravity.
 const PREVIEW_S: f64 = 12.0;
 

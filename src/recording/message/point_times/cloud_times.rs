@@ -1,6 +1,6 @@
 //! Summary of the point times of one cloud.
 
-use super::RawCloud;
+use super::raw_cloud::RawCloud;
 use crate::quantile::quantile;
 use zsim_base::time::Stamp;
 

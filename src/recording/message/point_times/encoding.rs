@@ -1,7 +1,7 @@
 //! Encoding of the points' times.
 
-use super::TimeUnit;
 use super::cloud_times::CloudTimes;
+use super::unit::TimeUnit;
 use zsim_base::time::{NANOS_PER_SECOND, Span, Stamp};
 
 /// Absolute times that differ by more than this from their cloud's stamp are on another clock, s.

@@ -1,6 +1,6 @@
 //! Detects the unit of point times if a lidar's clouds contradict the usual one.
 
-use super::CloudTimes;
+use super::cloud_times::CloudTimes;
 use crate::quantile::quantile;
 use zsim_base::time::NANOS_PER_SECOND;
 
