@@ -173,7 +173,14 @@ fn an_output_in_use_is_refused_until_its_run_is_killed() {
     ] {
         let mut child = zsim().current_dir(here.path()).args(first.split(' ')).spawn().unwrap();
         let started = std::time::Instant::now();
-        // The first process needs some time to lock.
+        // A second run that is sooner than the first takes its name, and the first another one.
+        let is_written = || {
+            let mut names = std::fs::read_dir(here.path()).unwrap().map(|entry| entry.unwrap().file_name());
+            names.any(|name| name.to_string_lossy().contains("long"))
+        };
+        while first == long && !is_written() && started.elapsed().as_secs() < 20 {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
         let refused = loop {
             let (code, _, stderr) = run(here.path(), second);
             let is_refused = code == 1 && stderr.contains(words);
