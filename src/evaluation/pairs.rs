@@ -19,7 +19,7 @@ impl Pairs {
     ///
     /// Interpolation cuts the corners of a path, so that a sparse truth would seem to be an error of the estimate. The
     /// sparser trajectory is that with the larger median interval in the common time. Nothing is interpolated over a gap of
-    /// more than [`MAX_INTERVALS`] of these intervals.
+    /// more than two of these intervals.
     ///
     /// # Errors
     /// When the trajectories have no time in common.
