@@ -51,6 +51,15 @@ pub enum EstimationError {
         /// Number of samples.
         samples: usize,
     },
+    /// A recording whose lidar measures nothing.
+    #[error(
+        "none of the {scans} lidar scans has a usable return: ranges are missing, out of the limits of the lidar's model, or all equal; \
+         look at the lidar's topic with `zsim info`, or give the model with --calibration"
+    )]
+    NoReturns {
+        /// Number of scans.
+        scans: usize,
+    },
     /// Both sensors have data at the same time, but never long enough without a gap.
     #[error(
         "IMU and lidar have {common_s:.3} s in common, but never {needed_s:.3} s without a gap; look at the rates and gaps of both \

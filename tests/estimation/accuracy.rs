@@ -156,6 +156,16 @@ fn a_sample_long_before_all_others_is_not_used() {
     assert!(score.rmse_m < 0.003, "{score:?}");
 }
 
+/// Both sensors cover eight seconds, but never a whole one: the error said that they had no time in common.
+#[test]
+fn data_with_a_gap_in_each_second_are_an_error_that_says_so() {
+    let mut kept = in_order(&hall(24, 8.0));
+    kept.retain(|m| seconds(m).fract() < 0.3);
+    let error = estimate_all(&spec(), &calibration(), kept.into_iter()).unwrap_err();
+    let EstimationError::Interrupted { common_s, .. } = &error else { panic!("{error}") };
+    assert!((6.0..8.0).contains(common_s), "{error}");
+}
+
 #[test]
 fn a_start_in_motion_is_reported_and_estimated() {
     let mut run = hall(9, 12.0);
@@ -391,6 +401,19 @@ fn a_recording_without_one_of_the_sensors_is_an_error() {
     assert_eq!(run(imu).unwrap_err(), EstimationError::NoLidar { samples: 400 });
     let short = hall(17, 0.4).measurements();
     assert!(matches!(run(short).unwrap_err(), EstimationError::TooShort { .. }));
+}
+
+/// The error blamed gaps of both sensors.
+#[test]
+fn scans_of_equal_ranges_are_an_error_that_says_so() {
+    let mut measurements = in_order(&hall(17, 4.0));
+    for measurement in &mut measurements {
+        if let Measurement::Lidar(scan) = measurement {
+            scan.returns.iter_mut().for_each(|hit| hit.point_in_laser = hit.point_in_laser.normalize());
+        }
+    }
+    let error = estimate_all(&spec(), &calibration(), measurements.into_iter()).unwrap_err();
+    assert_eq!(error, EstimationError::NoReturns { scans: 160 });
 }
 
 #[test]

@@ -121,7 +121,7 @@ impl Estimator {
     /// Processes the remaining data; the result has the poses not yet returned, and the reports of all windows.
     ///
     /// # Errors
-    /// If IMU or lidar data are missing or too short to start, localisation in the given map fails, or a pose is not finite.
+    /// If IMU or lidar data are missing, empty or too short for a pose, localisation in the given map fails, or a pose is not finite.
     pub fn finish(mut self) -> Result<OpenLoop, EstimationError> {
         self.keep_start();
         while let Some(segment) = self.intake.next_segment(true) {
@@ -136,6 +136,9 @@ impl Estimator {
         self.diagnostics.finish();
         if unplaced.is_none() {
             self.output_window(&mut tracking);
+            if self.newest_pose.is_none() {
+                return Err(self.missing_data_error());
+            }
         }
         self.into_open_loop(&tracking)
     }
@@ -192,11 +195,12 @@ impl Estimator {
         })
     }
 
-    /// The error of a run without any window.
+    /// The error of a run without any pose.
     fn missing_data_error(&self) -> EstimationError {
         match self.intake.counts() {
             (0, scans) => EstimationError::NoImu { scans },
             (samples, 0) => EstimationError::NoLidar { samples },
+            (_, scans) if self.intake.sees_nothing() => EstimationError::NoReturns { scans },
             _ => {
                 let (common_s, needed_s) = (self.intake.common_s(), 2.0 * self.spec.step_s);
                 if common_s < needed_s {

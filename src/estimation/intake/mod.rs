@@ -144,6 +144,11 @@ impl Intake {
         (self.samples.count, self.scans.count)
     }
 
+    /// Whether no scan received has a usable return.
+    pub(super) fn sees_nothing(&self) -> bool {
+        self.scans.empty == self.scans.count
+    }
+
     /// Queues a measurement in the order of the stamps of its sensor.
     pub(super) fn push(&mut self, measurement: Measurement) -> Result<(), EstimationError> {
         match measurement {

@@ -32,6 +32,8 @@ pub(super) struct ScanQueue {
     /// Raw stamp of the last scan used; earlier ones are late.
     used_s: f64,
     pub(super) count: usize,
+    /// Number of scans without a return, or with constant ranges.
+    pub(super) empty: usize,
     pub(super) late: usize,
     /// Number of scans discarded as repeats.
     pub(super) frozen: usize,
@@ -53,6 +55,7 @@ impl ScanQueue {
             waiting: VecDeque::new(),
             used_s: f64::NEG_INFINITY,
             count: 0,
+            empty: 0,
             late: 0,
             frozen: 0,
             repeated: (0, 0),
@@ -70,6 +73,7 @@ impl ScanQueue {
             return Err(EstimationError::NotFinite { sensor: "lidar", stamp_ns: scan.stamp.nanos() });
         }
         self.count += 1;
+        self.empty += usize::from(scan.returns.is_empty() || is_constant(&scan));
         self.planar &= scan.returns.iter().all(|hit| is_in_plane(&hit.point_in_laser));
         if seconds <= self.used_s {
             self.late += 1;
