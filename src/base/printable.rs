@@ -24,10 +24,10 @@ fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(|c| if is_harmless(c) { c.to_string() } else { escape(c) }).collect())
 }
 
-/// Whether a character needs no escape: a line end, a tab, or neither a control character, nor one that changes the
-/// direction of the text (Unicode Standard Annex 9), nor one that XML 1.0 forbids.
+/// Whether a character needs no escape: a line end, a tab, or neither a control character, nor one without width or that
+/// changes the direction of the text (Unicode Standard Annex 9), nor one that XML 1.0 forbids.
 fn is_harmless(c: char) -> bool {
-    let is_direction = matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let is_direction = matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     ['\n', '\t'].contains(&c) || !c.is_control() && !is_direction && !matches!(c, '\u{fffe}' | '\u{ffff}')
 }
 

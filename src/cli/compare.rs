@@ -22,9 +22,10 @@ const LOW_COVERAGE: f64 = 0.95;
 /// Compare estimated trajectories with the true one, and fail above a limit
 ///
 /// Estimates are TUM files with stamps of the clock of the truth. The denser of two trajectories is interpolated at the stamps
-/// of the sparser one. Each estimate is aligned with the truth (rigid, by positions, as evo_ape -a). The table has the time covered, the absolute error of the position (APE: RMSE and maximum)
-/// and of the rotation (RMSE), the relative error of the position over 1 m of path and 1 s (RPE: RMSE), and the drift. --out
-/// writes comparison.json and the plots errors and trajectories.
+/// of the sparser one. Each estimate is aligned with the truth (rigid, by positions, as evo_ape -a). The table has the time
+/// covered, the absolute error of the position (APE: RMSE and maximum) and of the rotation (RMSE), the relative error of the
+/// position over 1 m of path and 1 s (RPE: RMSE), and the drift. --out writes comparison.json and the plots errors and
+/// trajectories.
 ///
 /// The exit code is 1 if an estimate exceeds a limit, or is too short for the figure.
 #[derive(Args)]

@@ -20,8 +20,8 @@ const REACH_M: f64 = 1.0;
 /// Evaluate a trajectory against the true trajectory, and a cloud against the true surfaces
 ///
 /// The estimate is a TUM file (`t x y z qx qy qz qw`) with stamps of the clock of the truth. The denser of both is interpolated
-/// at the stamps of the sparser one. The estimate is aligned with the truth (rigid, by positions, as evo_ape -a). The same alignment is applied to a cloud in the map frame of the
-/// estimate; without trajectories, the cloud is in the world frame.
+/// at the stamps of the sparser one. The estimate is aligned with the truth (rigid, by positions, as evo_ape -a). The same
+/// alignment is applied to a cloud in the map frame of the estimate; without trajectories, the cloud is in the world frame.
 #[derive(Args)]
 #[command(
     group = clap::ArgGroup::new("what").required(true).multiple(true).args(["estimate", "cloud"]),

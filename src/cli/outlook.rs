@@ -30,6 +30,9 @@ struct Sensor {
 
 impl Outlook {
     /// Selects the sensors of `reader`, whose summary is `info`.
+    ///
+    /// # Errors
+    /// When the shipped settings of the estimator cannot be read.
     pub fn new(reader: &Reader, info: &RecordingInfo) -> anyhow::Result<Self> {
         let selection = match reader.select(&TopicPreference::default()) {
             Ok(selection) => selection,
@@ -67,9 +70,7 @@ impl Outlook {
             sensor.as_ref().map(|Sensor { topic, frame }| format!("{name}: {topic}, frame {frame}"))
         };
         let unused = self.unused.iter().map(|unused| format!("not used: {unused}"));
-        // Unusable topics are also in the list above.
-        let notes =
-            self.notes.iter().filter(|note| !note.starts_with("Not used: topic")).map(|note| format!("note: {note}"));
+        let notes = self.notes.iter().map(|note| format!("note: {note}"));
         let end = match &self.refused {
             Some(problem) => format!("zsim estimate: refused: {problem}"),
             None => "zsim estimate: ready".to_owned(),

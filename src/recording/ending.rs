@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// The format that the ending of a name stands for, unless it is MCAP, the only format that is written.
+/// The format that the ending of a name denotes, unless it is MCAP, the only format that is written.
 pub fn other_format(path: &Path) -> Option<&'static str> {
     let ending = path.extension()?;
     let formats = [("bag", "a ROS 1 bag"), ("db3", "a database of rosbag2")];

@@ -8,6 +8,7 @@ use std::ffi::OsStr;
 use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use zsim_base::files;
+use zsim_base::printable::printable_name;
 
 /// Extensions of recording files.
 const EXTENSIONS: [&str; 3] = ["mcap", "db3", "bag"];
@@ -105,7 +106,7 @@ fn find_listed_file(folder: &Path, name: &str) -> Result<PathBuf, RecordingError
         path: folder.to_owned(),
         problem: format!(
             "lacks the file `{}`, which its {METADATA_FILE} lists; restore it, or list the other files anew with `ros2 bag reindex {}`",
-            crate::topics::printable(name),
+            printable_name(name),
             folder.display()
         ),
     })

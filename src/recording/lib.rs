@@ -18,9 +18,9 @@
 //!
 //! Stamps are from the sensors' own clocks (poses: the lidar's). The log time of a message is its arrival in true time.
 //!
-//! [`TumWriter`] and [`read_tum`] handle trajectories ([`TrajectoryFile`] also in the formats of EuRoC and KITTI), [`PlyWriter`], [`PlyReader`] and [`LasWriter`] point clouds,
-//! [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`write_result`] writes an estimate as a recording for
-//! viewers, [`write_rosbag2_metadata`] the metadata of a folder of rosbag2.
+//! [`TumWriter`] and [`read_tum`] handle trajectories ([`TrajectoryFile`] also in the formats of EuRoC and KITTI), [`PlyWriter`],
+//! [`PlyReader`] and [`LasWriter`] point clouds, [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`write_result`]
+//! writes an estimate as a recording for viewers, [`write_rosbag2_metadata`] the metadata of a folder of rosbag2.
 //!
 //! On a running robot [`Incoming`] decodes messages as they arrive, [`ReceivedWriter`] records them, and
 //! [`EstimateMessages`] encodes the estimate.

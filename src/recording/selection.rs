@@ -60,6 +60,11 @@ impl Selection {
         self.imu.shift
     }
 
+    /// Notes on topics with messages of a sensor that cannot be used, one sentence each.
+    pub fn unusable_topics(&self) -> impl Iterator<Item = String> {
+        self.unused.iter().filter(|unused| !unused.is_usable).map(|unused| format!("Not used: {unused}."))
+    }
+
     /// Topic of the accelerations, if it is not that of the angular velocities.
     pub fn acceleration_topic(&self) -> Option<&str> {
         match &self.imu.layout {
@@ -152,13 +157,12 @@ impl Reader {
         };
         let notes = choice.notes();
         let unusable = || lidars.unusable.iter().chain(&imus.unusable);
-        let unusable_notes = unusable().map(|unused| format!("Not used: {unused}."));
         Ok(Selection {
             lidar_topic: lidar.topic.clone(),
             lidar_frame,
             imu_topic: imu.candidate.topic.clone(),
             imu_frame,
-            notes: notes.into_iter().chain(unusable_notes).collect(),
+            notes,
             unused: other_lidars.into_iter().chain(imu.unused).chain(unusable().cloned()).collect(),
             lidar: lidar_reading,
             imu: ImuDecoding { unit: imu.unit, layout: imu.layout, shift: shift.unwrap_or(Span::ZERO) },

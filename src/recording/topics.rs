@@ -1,6 +1,7 @@
 //! Topics and frames of recordings that zsim writes.
 
 use crate::schema::MessageType;
+use zsim_base::printable::printable_name;
 
 /// Frame of the lidar.
 pub const LASER: &str = "laser";
@@ -22,18 +23,6 @@ pub const TRUTH_HEAD: &str = "truth/head";
 /// Prefix of the ground truth topics.
 pub const TRUTH_PREFIX: &str = "/ground_truth/";
 
-/// Printable form of a name: control characters and text-direction characters are escaped.
-pub fn printable(name: &str) -> String {
-    let is_hidden = |c: char| {
-        c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    let mut printed = String::with_capacity(name.len());
-    for c in name.chars() {
-        if is_hidden(c) { printed.extend(c.escape_unicode()) } else { printed.push(c) }
-    }
-    printed
-}
-
 /// Maximum length of a name in a message, characters.
 const MAX_NAME: usize = 80;
 
@@ -43,7 +32,7 @@ pub fn shortened(name: &str) -> String {
     if start.len() < name.len() {
         start.push('\u{2026}');
     }
-    printable(&start)
+    printable_name(&start)
 }
 
 /// Topic that zsim writes.

@@ -355,12 +355,13 @@ fn report_notes(
     options: &EstimateOptions,
     watch: &mut ProgressMonitor,
 ) {
-    selection.notes.iter().chain(&found.notes).for_each(|note| watch.note(note));
+    let unusable: Vec<String> = selection.unusable_topics().collect();
+    selection.notes.iter().chain(&unusable).chain(&found.notes).for_each(|note| watch.note(note));
     let given = options.calibration.head_from_laser.is_some() && options.calibration.head_from_imu.is_some();
     if !found.from_recording && !given {
         watch.note(
-            "no transforms of the recording join lidar and IMU: assuming that lidar and IMU coincide and have the same axes; if not, pass the \
-             extrinsics with --calibration",
+            "no transforms of the recording join lidar and IMU: assuming that they coincide and have the same axes; if not, \
+             pass the extrinsics with --calibration",
         );
     }
 }

@@ -135,6 +135,9 @@ fn a_ros_1_bag_is_read_with_any_compression() {
         let reader = Reader::new("run.bag", Cursor::new(bytes)).unwrap();
         assert_eq!(reader.loss().cut_short, !indexed, "{compression}");
         let info = reader.info(Span::from_seconds(0.5)).unwrap();
+        // The stamps are the log times; a header of ROS 1 begins with a sequence number.
+        let clocks: Vec<f64> = info.topics.iter().filter_map(|topic| Some(topic.clock?.offset_s)).collect();
+        assert!(clocks.len() > 1 && clocks.iter().all(|offset_s| offset_s.abs() < 1e-6), "{clocks:?}");
         assert_eq!((info.messages, info.topics.len()), (121, 4), "{compression}");
         if indexed {
             assert!(info.loss.is_none(), "{}", info.loss);

@@ -74,7 +74,8 @@ pub(crate) fn run(command: &LiveCommand, global: &Global) -> anyhow::Result<Comp
     let hint = command.network.hint();
     let start = gather(&mut bridge, &mut sources, until, || stop.load(Ordering::Relaxed), hint, &bar)?;
     let sensors = start.finish(&preference, &given)?;
-    sensors.selection.notes.iter().chain(&sensors.found.notes).for_each(|note| bar.note(note));
+    let unusable: Vec<String> = sensors.selection.unusable_topics().collect();
+    sensors.selection.notes.iter().chain(&unusable).chain(&sensors.found.notes).for_each(|note| bar.note(note));
     if !sensors.found.from_recording && (given.head_from_laser.is_none() || given.head_from_imu.is_none()) {
         bar.note(
             "no /tf_static has arrived: assuming that lidar and IMU coincide and have the same axes; if not, pass the \

@@ -4,10 +4,10 @@ use super::budget::Budget;
 use super::encoding::Encoding;
 use super::record::{self, ChannelFields, SchemaFields, op};
 use crate::RecordingError;
-use crate::topics::printable;
 use crate::wire::WireFormat;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use zsim_base::printable::printable_name;
 
 /// Number of a topic within a recording: number of the file and number within the file.
 pub type ChannelId = u32;
@@ -190,9 +190,9 @@ impl FileIndex {
     pub fn channels(&self, id_of: impl Fn(u16) -> ChannelId) -> impl Iterator<Item = Channel> {
         self.channels.iter().map(move |(id, channel)| Channel {
             id: id_of(*id),
-            topic: printable(&channel.topic),
-            type_name: self.schemas.get(&channel.schema).map(|schema| printable(&schema.name)).unwrap_or_default(),
-            encoding: printable(&channel.encoding),
+            topic: printable_name(&channel.topic),
+            type_name: self.schemas.get(&channel.schema).map(|schema| printable_name(&schema.name)).unwrap_or_default(),
+            encoding: printable_name(&channel.encoding),
             wire: WireFormat::from_encoding(&channel.encoding),
             has_header: self.schemas.get(&channel.schema).is_some_and(|schema| schema.has_header),
         })

@@ -2,9 +2,9 @@
 
 use crate::RecordingError;
 use crate::schema::MessageType;
-use crate::topics::printable;
 use crate::wire::{DecodeError, Decoder, Encoder, Payload};
 use zsim_base::geometry::Pose;
+use zsim_base::printable::printable_name;
 use zsim_base::time::Stamp;
 
 /// Minimum bytes of a serialised transform: time, two strings, seven doubles.
@@ -76,7 +76,7 @@ pub fn decode(message: Payload<'_>) -> Result<Vec<ReadTransform>, DecodeError> {
 
 /// Printable name of a frame, without the leading slash of tf 1.
 pub fn printable_frame(frame: &str) -> String {
-    printable(frame.trim_start_matches('/'))
+    printable_name(frame.trim_start_matches('/'))
 }
 
 /// Whether `frame`, as written, has the name `printable`.

@@ -170,7 +170,7 @@ impl CandidateSearch<'_> {
             unusable.extend(reason.map(|reason| (candidate.topic.clone(), reason.to_owned())));
             reason.is_none()
         });
-        let unusable = unusable.into_iter().map(|(topic, reason)| UnusedTopic { topic, reason });
+        let unusable = unusable.into_iter().map(|(topic, reason)| UnusedTopic { topic, reason, is_usable: false });
         Candidates { found: self.found, unusable: unusable.collect() }
     }
 }

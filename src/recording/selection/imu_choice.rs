@@ -102,7 +102,7 @@ impl Reader {
         let others = all.iter().filter(|c| c.topic != rates.topic && c.topic != forces.topic);
         let unused = others.map(|other| {
             let reason = reason_against(other, content(other), rates);
-            UnusedTopic { topic: other.topic.clone(), reason }
+            UnusedTopic { topic: other.topic.clone(), reason, is_usable: true }
         });
         Ok(Some(ImuChoice { candidate: rates.clone(), layout, unit, preview, unused: unused.collect() }))
     }

@@ -31,7 +31,7 @@ pub fn choose(
             let sensor = if other.frame == chosen.frame { "the same sensor" } else { "another sensor" };
             format!("{sensor} (frame {frame}), as suitable; the first topic by name is used")
         };
-        UnusedTopic { topic: other.topic.clone(), reason }
+        UnusedTopic { topic: other.topic.clone(), reason, is_usable: true }
     });
     Some((chosen, chosen.kind?, unused.collect()))
 }

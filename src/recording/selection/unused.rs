@@ -8,6 +8,8 @@ pub struct UnusedTopic {
     pub topic: String,
     /// Why it is not used, a clause.
     pub reason: String,
+    /// Whether it could be used if it were requested.
+    pub is_usable: bool,
 }
 
 impl fmt::Display for UnusedTopic {

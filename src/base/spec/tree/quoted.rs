@@ -5,7 +5,7 @@ use super::node::Kind;
 
 const NOT_A_CHARACTER: &str = "Not a valid byte-escaped Unicode character";
 
-/// What an escape stands for.
+/// What an escape means.
 enum Escape {
     Byte(u8),
     Char(char),
