@@ -1,5 +1,6 @@
 //! Losses and notes of a run: one entry for each kind, with count, first and last time, and the worst case.
 
+use std::collections::BTreeMap;
 use zsim_base::time::Stamp;
 use zsim_estimation::{Discarded, Warning, WarningKind};
 use zsim_recording::ClockStep;
@@ -28,10 +29,13 @@ impl Events {
     /// Adds a note on the steps of the sensors' clocks, with times relative to `start`.
     pub fn add_clock_steps(&mut self, steps: &[ClockStep], start: Stamp) {
         let (Some(largest), Some(sentence)) = (ClockStep::largest(steps), ClockStep::sentence(steps)) else { return };
+        // Two sensors of one clock step once.
+        let mut counts = BTreeMap::<&str, u64>::new();
+        steps.iter().for_each(|step| *counts.entry(&step.topic).or_default() += 1);
         let times_s = || steps.iter().map(|step| step.at.seconds_since(start));
         self.notes.push(EventMetrics {
             kind: "clock_step".to_owned(),
-            count: steps.len() as u64,
+            count: counts.into_values().max().unwrap_or(0),
             first_s: times_s().min_by(f64::total_cmp),
             last_s: times_s().max_by(f64::total_cmp),
             worst: Some(largest.by.seconds().abs()),

@@ -65,7 +65,7 @@ impl Distribution {
         let gain = |rate: f64| (rate * (2.0 - rate) * rates.effective).sqrt();
         self.step_path = (1.0 - rates.step) * &self.step_path + gain(rates.step) * self.whitened(&y_w); // (43)
         let length = self.step_path.norm() / rates.expected_length;
-        // The path stands still while the step size still grows fast.
+        // The path is not updated while the step size still grows fast.
         let settled = (1.0 - (1.0 - rates.step).powf(2.0 * self.generations as f64)).sqrt();
         let is_short = length / settled < 1.4 + 2.0 / (n + 1.0);
         let (moving, lost) = if is_short { (1.0, 0.0) } else { (0.0, rates.path * (2.0 - rates.path)) };
