@@ -147,6 +147,19 @@ fn a_page_sees_the_map_grow_and_the_verdict_and_the_results_are_the_same() {
 }
 
 #[test]
+fn a_page_of_a_run_without_a_report_names_none() {
+    let here = tempfile::tempdir().unwrap();
+    let arguments = "--quiet --scene mocap_room --duration 8s --out out --live --metrics-only";
+    let live = LiveRun::start(here.path(), arguments);
+    let updates = live.updates();
+    let last = updates.last().unwrap();
+    assert!(last["end"]["report"].is_null() && last["verdict"]["status"].is_string(), "{last}");
+    assert!(live.get("/report.html").head.starts_with("HTTP/1.1 404"));
+    live.leave();
+    assert_eq!(live.exit_code(), 0);
+}
+
+#[test]
 fn requests_in_the_name_of_another_site_are_refused() {
     let here = tempfile::tempdir().unwrap();
     let live = LiveRun::start(here.path(), "--quiet --scene mocap_room --duration 20s --out out --live");

@@ -93,13 +93,16 @@ impl Live {
         self.queue.close();
         // A thread that has panicked has left a state that can still be shown.
         let _ = self.updating.join();
-        let report = folder.join("report.html");
-        let path = std::path::absolute(&report).unwrap_or_else(|_| report.clone());
-        let path = printable(&path.display().to_string()).into_owned();
+        // With --metrics-only there is no report.
+        let report = Some(folder.join("report.html")).filter(|report| report.is_file());
+        let path = report.as_ref().map(|report| {
+            let path = std::path::absolute(report).unwrap_or_else(|_| report.clone());
+            printable(&path.display().to_string()).into_owned()
+        });
         match outcome {
             Ok(EstimateResult { metrics, .. }) => {
-                let end = LiveEnd { sentence: "the run is complete".to_owned(), report: Some(path) };
-                self.shared.end(end, LiveVerdict::of(metrics), Some(&report));
+                let end = LiveEnd { sentence: "the run is complete".to_owned(), report: path };
+                self.shared.end(end, LiveVerdict::of(metrics), report.as_deref());
             }
             Err(error) => {
                 let sentence = match error {
