@@ -206,7 +206,7 @@ impl World {
     }
 
     /// Notes about the meshes, one sentence each: triangles without area that were removed, sizes that suggest another unit,
-    /// places far from the origin, and materials that the scene does not have.
+    /// positions far from the origin, and materials that the scene does not have.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }

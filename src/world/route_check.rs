@@ -7,14 +7,14 @@ use zsim_base::geometry::{Route, Vector};
 const CARRIER_HEIGHT_M: f64 = 1.0;
 /// Maximum distance of the floor below a route, m.
 const MAX_DROP_M: f64 = 1.0;
-/// Distance between two places at which the floor is searched, m.
+/// Distance between two points at which the floor is searched, m.
 const STEP_M: f64 = 0.5;
 /// Maximum number of legs, and of searches for the floor, of a route: bounds the time.
 const MAX_CASTS: usize = 20_000;
 
 impl World {
-    /// Warnings about routes that cannot be walked, one sentence each, with the first place: a surface 1 m above the route
-    /// (movers, plants and canopies do not count), no floor within 1 m below it, or a place outside the scene.
+    /// Warnings about routes that cannot be walked, one sentence each, with the first position: a surface 1 m above the route
+    /// (movers, plants and canopies do not count), no floor within 1 m below it, or a point outside the scene.
     pub fn route_warnings(&self) -> Vec<String> {
         self.routes().iter().flat_map(|(name, route)| self.warnings_of(name, route)).collect()
     }
@@ -36,8 +36,8 @@ impl World {
         }
         let length_m: f64 = legs.iter().map(|(from, to)| (to - from).norm()).sum();
         let step_m = STEP_M.max(length_m / MAX_CASTS as f64);
-        let places = legs.iter().flat_map(|leg| places(leg, step_m)).take(2 * MAX_CASTS);
-        let missing: Vec<Vector> = places.filter(|place| !self.has_floor(place)).collect();
+        let along = legs.iter().flat_map(|leg| points_along(leg, step_m)).take(2 * MAX_CASTS);
+        let missing: Vec<Vector> = along.filter(|place| !self.has_floor(place)).collect();
         let (lower, upper) = self.bounds();
         let is_outside = |place: &&Vector| (0..2).any(|axis| place[axis] < lower[axis] || place[axis] > upper[axis]);
         if let Some(place) = missing.iter().find(is_outside) {
@@ -53,7 +53,7 @@ impl World {
         warnings
     }
 
-    /// The first surface on a leg at the height of a carrier: place and material.
+    /// The first surface on a leg at the height of a carrier: position and material.
     fn obstacle(&self, (from, to): &(Vector, Vector)) -> Option<(Vector, &str)> {
         let up = Vector::z() * CARRIER_HEIGHT_M;
         let ray = Ray { origin_in_world: from + up, direction_in_world: (to - from).try_normalize(0.0)? };
@@ -67,8 +67,8 @@ impl World {
     }
 }
 
-/// Places along a leg, the start included and the end not.
-fn places((from, to): &(Vector, Vector), step_m: f64) -> impl Iterator<Item = Vector> + use<> {
+/// Returns points along a leg, the start included and the end not.
+fn points_along((from, to): &(Vector, Vector), step_m: f64) -> impl Iterator<Item = Vector> + use<> {
     let (from, leg) = (*from, to - from);
     let count = (leg.norm() / step_m).ceil().max(1.0);
     (0..count as usize).map(move |k| from + leg * (k as f64 / count))

@@ -103,7 +103,7 @@ fn scene_cases() -> Vec<Case> {
             "more than 1000000 copies",
         ),
         (
-            "| search for the places of all scatters of a scene | about 5 s |",
+            "| search for the positions of all scatters of a scene | about 5 s |",
             items(&scatter(200_000, "min_spacing_m: 0.5,")),
             "within the limit of time",
         ),
@@ -230,7 +230,7 @@ fn devices_and_pipes_are_not_opened() {
         World::build(&parse(&source).unwrap(), &source).err().unwrap().to_string()
     };
     for file in ["m.gltf", "z.gltf", "zero.obj"] {
-        assert!(scene("", file).contains("it is not a file"), "{}", scene("", file));
+        assert!(scene("", file).contains("not a regular file"), "{}", scene("", file));
     }
     assert!(scene("\"scene.ron\"", "m.gltf").contains("no such scene"), "{}", scene("\"scene.ron\"", "m.gltf"));
 }

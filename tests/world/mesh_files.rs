@@ -1,4 +1,4 @@
-//! Mesh files as programs write them: concave faces, text encodings, materials, places far from the origin.
+//! Mesh files as programs write them: concave faces, text encodings, materials, positions far from the origin.
 
 use zsim::geometry::Vector;
 use zsim::world::{Hit, Ray, World, WorldError};

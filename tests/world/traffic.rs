@@ -123,7 +123,7 @@ fn nothing_in_the_assembly_plant_runs_into_the_operator_or_through_walls() {
         moved += usize::from(world.distance_to_movers_m(&at, 4.0, t_s).is_some());
     }
     assert!(moved > 20, "people or vehicles pass within 4 m in {moved} of 720 samples only");
-    // The people walk free of everything that stands.
+    // The people walk free of all static objects.
     let movers = parse::<SceneSpec>(&find(Kind::Scene, "assembly_plant").unwrap()).unwrap().movers;
     for (index, person) in movers.iter().enumerate().filter(|(_, mover)| mover.template == "person") {
         for step in 0..480 {

@@ -31,6 +31,9 @@ pub(super) struct MeshBuilder {
 
 impl MeshBuilder {
     /// Sets the material of the faces that follow.
+    ///
+    /// # Errors
+    /// When there are too many materials.
     pub fn set_material(&mut self, name: Option<&str>) -> Result<(), MeshError> {
         let Some(name) = name else {
             self.material = 0;
@@ -49,6 +52,9 @@ impl MeshBuilder {
     }
 
     /// Adds a face with its corners in order.
+    ///
+    /// # Errors
+    /// When it is not a surface, or there are too many corners or triangles.
     pub fn polygon(&mut self, corners: &[Vector]) -> Result<(), MeshError> {
         self.face_count += 1;
         self.effort = self.effort.saturating_add(corners.len().saturating_mul(corners.len()));
@@ -63,6 +69,9 @@ impl MeshBuilder {
     }
 
     /// Adds a triangle.
+    ///
+    /// # Errors
+    /// When there are too many.
     pub fn triangle(&mut self, triangle: Triangle) -> Result<(), MeshError> {
         self.face_count += 1;
         self.reserve(1)?;
@@ -71,6 +80,9 @@ impl MeshBuilder {
     }
 
     /// Checks that `more` triangles are within the limit.
+    ///
+    /// # Errors
+    /// When they are not.
     pub fn reserve(&self, more: usize) -> Result<(), MeshError> {
         if more > MAX_TRIANGLES - self.faces.triangles.len() { Err(MeshError::TooManyTriangles) } else { Ok(()) }
     }

@@ -24,7 +24,11 @@ pub(crate) enum FaceFault {
     TooManyCorners(usize),
     #[error("has a corner that is not finite")]
     NotFinite,
-    #[error("is not flat: a corner is {:.1} % of its size out of its plane; the maximum is {} %: export the mesh with triangles", 100.0 * .0, 100.0 * MAX_OUT_OF_PLANE)]
+    #[error(
+        "is not flat: a corner is {:.1} % of its size out of its plane; the maximum is {} %: export the mesh with triangles",
+        100.0 * .0,
+        100.0 * MAX_OUT_OF_PLANE
+    )]
     NotFlat(f64),
     #[error("crosses itself: its corners do not follow its outline")]
     CrossesItself,
