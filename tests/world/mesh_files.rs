@@ -93,6 +93,17 @@ fn files_of(points: &[[f64; 3]]) -> [(&'static str, Vec<u8>); 4] {
     ]
 }
 
+/// A face of one or two corners in a PLY file caused a panic.
+#[test]
+fn a_face_of_fewer_than_three_corners_is_an_error_in_every_format() {
+    for count in 0..3 {
+        for (name, bytes) in files_of(&DOOR[..count]) {
+            let error = error(name, &bytes);
+            assert!(error.contains("at least three corners"), "{name}, {count} corners: {error}");
+        }
+    }
+}
+
 #[test]
 fn beams_pass_an_open_doorway_in_every_format_and_from_every_first_corner() {
     for start in 0..DOOR.len() {

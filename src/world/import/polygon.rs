@@ -20,6 +20,8 @@ pub(super) type Indices = [usize; 3];
 /// Why a face is not a surface.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub(crate) enum FaceFault {
+    #[error("has too few corners ({0}); a face has at least three corners")]
+    TooFewCorners(usize),
     #[error("has {0} corners; the maximum is {MAX_CORNERS}")]
     TooManyCorners(usize),
     #[error("has a corner that is not finite")]
@@ -40,6 +42,9 @@ pub(crate) enum FaceFault {
 pub(super) fn triangulate(corners: &[Vector]) -> Result<Vec<Indices>, FaceFault> {
     if corners.len() == 3 {
         return Ok(vec![[0, 1, 2]]);
+    }
+    if corners.len() < 3 {
+        return Err(FaceFault::TooFewCorners(corners.len()));
     }
     if corners.len() > MAX_CORNERS {
         return Err(FaceFault::TooManyCorners(corners.len()));
