@@ -25,6 +25,10 @@ fn run() -> RunDescription {
         accel_bias_walk_m_per_s2_per_sqrt_s: 2e-4,
         gyro_turn_on_bias_rad_per_s: 3e-3,
         accel_turn_on_bias_m_per_s2: 0.05,
+        gyro_scale_error: 0.0,
+        gyro_misalignment_rad: 0.0,
+        accel_scale_error: 0.0,
+        accel_misalignment_rad: 0.0,
         gyro_limit_rad_per_s: 10.0,
         accel_limit_m_per_s2: 49.0,
     };

@@ -6,7 +6,7 @@ use super::residual::{
     LIDAR_TRANSLATION, RANGE,
 };
 use super::spec::EstimatorSpec;
-use super::strapdown::{Biases, Interval, State};
+use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
 use super::unknowns::Unknowns;
 use nalgebra::{SMatrix, SVector};
 use zsim_base::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
@@ -232,8 +232,15 @@ fn information(
     let (turn, shift) = extrinsics.sigmas();
     sigmas[LIDAR_ROTATION..LIDAR_ROTATION + 3].fill(turn.max(1e-9));
     sigmas[LIDAR_TRANSLATION..LIDAR_TRANSLATION + 3].fill(shift.max(1e-9));
-    sigmas[GYRO_MATRIX..GYRO_MATRIX + 9].fill(inertial.gyro_matrix_sigma.max(1e-9));
-    sigmas[ACCEL_MATRIX..ACCEL_MATRIX + 9].fill(inertial.accel_matrix_sigma.max(1e-9));
+    let of_model = ImuScaleMisalignment::sigmas_of(noise);
+    for (start, of_model, setting) in [
+        (GYRO_MATRIX, of_model.gyro, inertial.gyro_matrix_sigma),
+        (ACCEL_MATRIX, of_model.accel, inertial.accel_matrix_sigma),
+    ] {
+        let sigma = |of_model: f64| if setting > 0.0 { of_model.max(setting) } else { 1e-9 };
+        // The entries are in the order of rows.
+        of_model.transpose().iter().zip(&mut sigmas[start..start + 9]).for_each(|(model, into)| *into = sigma(*model));
+    }
     let mut information = SMatrix::from_diagonal(&SVector::from(sigmas.map(|sigma| sigma.powi(-2))));
     if extrinsics.estimated {
         // The lidar attitude needs a reference: the IMU frame is that of the gyroscope axes.

@@ -104,7 +104,7 @@ pub use estimator::{Estimator, estimate_all};
 pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_blocks, findings, radius_99};
 pub use map::{LocalisedPose, locate_map, map_of, merge_maps};
 pub use observed::ObservedSurfels;
-pub use output::{ALIGNMENT_S, EstimatedPose, OpenLoop, TURN_LEVER_M, WindowReport};
+pub use output::{ALIGNMENT_S, EstimatedPose, MatrixEntry, OpenLoop, TURN_LEVER_M, WindowReport};
 pub use registration::{
     ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
 };

@@ -189,6 +189,15 @@ pub(super) struct Correction {
 }
 
 impl Correction {
+    /// The sum of two small corrections.
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        Self {
+            rotation: self.rotation + other.rotation,
+            translation: self.translation + other.translation,
+            velocity: self.velocity + other.velocity,
+        }
+    }
+
     /// The value of the correction spline; `coefficients` has `[dr, dt]` for each knot from index `first` on.
     pub(super) fn of_spline(basis: &Basis, first: i64, coefficients: &[f64]) -> Self {
         let mut sum = Self { rotation: Vector::zeros(), translation: Vector::zeros(), velocity: Vector::zeros() };

@@ -34,6 +34,26 @@ pub struct EstimatedPose {
     pub clock_offset_s: f64,
 }
 
+/// Smallest standard deviation of scale and misalignment that an IMU is judged by: a vibration, a filter or wrong extrinsics of
+/// a sound run look like such an error.
+const MIN_MODEL_SIGMA: f64 = 0.00225;
+
+/// An estimated scale error or misalignment (rad) of an axis of an IMU.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MatrixEntry {
+    /// Absolute value.
+    pub value: f64,
+    /// Standard deviation according to the model of the IMU.
+    pub model_sigma: f64,
+}
+
+impl MatrixEntry {
+    /// Returns the value over the standard deviation of the model, taken as at least 0.2 %.
+    pub fn over_model(&self) -> f64 {
+        self.value / self.model_sigma.max(MIN_MODEL_SIGMA)
+    }
+}
+
 /// Diagnostics of the solution of a window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WindowReport {
@@ -63,8 +83,8 @@ pub struct WindowReport {
     pub clock_rate: f64,
     /// Estimated correction of all ranges, m.
     pub range_correction_m: f64,
-    /// Largest entry of the estimated scale errors and misalignments of gyroscope and accelerometer.
-    pub imu_matrix: f64,
+    /// Entry of the estimated scale errors and misalignments of the IMU that is the largest relative to its model.
+    pub imu_matrix: MatrixEntry,
     /// Speed of the IMU at the end of the window, m/s.
     pub speed_m_per_s: f64,
     /// Whether the head moves, so that surfaces should be matched.

@@ -94,8 +94,8 @@ pub struct InertialSpec {
     /// Factor on the calibrated noise densities; accounts for errors that are not white.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub noise_inflation: f64,
-    /// Prior standard deviation of the estimated scale errors and misalignments of the gyroscope, 0..1; 0 to estimate
-    /// none.
+    /// Least prior standard deviation of the estimated scale errors and misalignments (rad) of the gyroscope, 0..1; a larger
+    /// one of the IMU's model is used instead. 0 to estimate none.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub gyro_matrix_sigma: f64,
     /// The same for the accelerometer.

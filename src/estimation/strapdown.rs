@@ -14,6 +14,7 @@
 //! compensates for coning and sculling delivers these sums divided by `h`: the terms must not be added again.
 
 use zsim_base::geometry::{Matrix, Rotation, Vector};
+use zsim_base::measurement::ImuNoise;
 
 /// IMU readings over an interval, in the IMU frame; see the module for their relation to the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +64,20 @@ impl ImuScaleMisalignment {
     /// No scale error or misalignment.
     pub(super) fn zero() -> Self {
         Self { gyro: Matrix::zeros(), accel: Matrix::zeros() }
+    }
+
+    /// Standard deviations of the entries, according to the model of the IMU.
+    pub(super) fn sigmas_of(model: &ImuNoise) -> Self {
+        let of = |scale, misalignment| Matrix::from_fn(|i, j| if i == j { scale } else { misalignment });
+        Self {
+            gyro: of(model.gyro_scale_error, model.gyro_misalignment_rad),
+            accel: of(model.accel_scale_error, model.accel_misalignment_rad),
+        }
+    }
+
+    /// The entries of both matrices, those of the gyroscope first.
+    pub(super) fn entries(&self) -> impl Iterator<Item = f64> {
+        self.gyro.iter().chain(&self.accel).copied()
     }
 
     /// Rotation of the accelerometer axes relative to the gyroscope axes, a rotation vector, rad.

@@ -351,7 +351,7 @@ pub(super) fn write_windows(folder: &Path, windows: &[WindowReport]) -> Result<(
             w.clock_offset_s,
             w.clock_rate,
             w.range_correction_m,
-            w.imu_matrix,
+            w.imu_matrix.value,
             u8::from(w.moving),
         )
     });

@@ -46,6 +46,14 @@ pub struct ImuNoiseSpec {
     pub gyro_turn_on_bias_rad_per_s: Option<f64>,
     /// Standard deviation of the accelerometer bias at power-on, m/s^2.
     pub accel_turn_on_bias_m_per_s2: Option<f64>,
+    /// Standard deviation of the scale error of each axis of the gyroscope, as a fraction of the rate.
+    pub gyro_scale_error: Option<f64>,
+    /// Standard deviation of the misalignment of each axis of the gyroscope towards each other axis, rad.
+    pub gyro_misalignment_rad: Option<f64>,
+    /// Standard deviation of the scale error of each axis of the accelerometer, as a fraction of the specific force.
+    pub accel_scale_error: Option<f64>,
+    /// Standard deviation of the misalignment of each axis of the accelerometer towards each other axis, rad.
+    pub accel_misalignment_rad: Option<f64>,
     /// Measuring range of the gyroscope per axis, rad/s.
     pub gyro_limit_rad_per_s: Option<f64>,
     /// Measuring range of the accelerometer per axis, m/s^2.
@@ -192,6 +200,10 @@ impl Values {
             accel_bias_walk_m_per_s2_per_sqrt_s: value!(accel_bias_walk_m_per_s2_per_sqrt_s),
             gyro_turn_on_bias_rad_per_s: value!(gyro_turn_on_bias_rad_per_s),
             accel_turn_on_bias_m_per_s2: value!(accel_turn_on_bias_m_per_s2),
+            gyro_scale_error: value!(gyro_scale_error),
+            gyro_misalignment_rad: value!(gyro_misalignment_rad),
+            accel_scale_error: value!(accel_scale_error),
+            accel_misalignment_rad: value!(accel_misalignment_rad),
             gyro_limit_rad_per_s: value!(gyro_limit_rad_per_s),
             accel_limit_m_per_s2: value!(accel_limit_m_per_s2),
         }

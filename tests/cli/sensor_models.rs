@@ -64,7 +64,7 @@ fn each_value_is_from_the_calibration_else_the_manifest_else_assumed() {
     assert_eq!(noise(&own, "lidar.near_sigma_m").1, "assumed");
     assert_eq!(own["sensors"]["imu_averaging"], "none");
     assert_eq!(own["sensors"]["imu_averaging_source"], "from --calibration");
-    let sources = "noise: IMU 1 from --calibration, 7 assumed; lidar assumed; assumed are IMU noise of a typical IMU";
+    let sources = "noise: IMU 1 from --calibration, 11 assumed; lidar assumed; assumed are IMU noise of a typical IMU";
     assert!(stderr.contains(sources), "{stderr}");
     assert!(own["open_loop"]["position_rmse_m"].as_f64().is_some(), "the truth is still used");
 }
@@ -139,4 +139,30 @@ fn of_a_manifest_with_a_renamed_key_of_the_scene_both_sensors_are_read() {
     assert!(stderr.contains("note: noise: from the recording's manifest\n"), "{stderr}");
     assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
     assert!(metrics["cloud"]["sigma_m"].is_null());
+}
+
+/// The shipped consumer IMU ended as "implausible IMU scale" or lost, because the limit was a constant, and because errors of the
+/// gyroscope too fast for the correction spline counted as a contradiction.
+#[test]
+fn an_imu_is_judged_by_the_scale_error_of_its_model() {
+    let here = tempfile::tempdir().unwrap();
+    let simulate = "simulate --scene courtyard --imu consumer --seed 2 --duration 30s --out run.mcap";
+    assert_eq!(run(here.path(), simulate).0, 0);
+    let estimate = |arguments: &str| {
+        let command = format!("estimate run.mcap --open-loop --metrics-only --force --json --out result {arguments}");
+        let (code, out, stderr) = run(here.path(), &command);
+        let metrics: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{stderr}"));
+        let of = |key: &str, value: &str| metrics[key][value].as_f64().unwrap();
+        let causes = metrics["integrity"]["causes"].to_string();
+        (code, of("open_loop", "position_rmse_m"), of("integrity", "within_bound"), causes)
+    };
+    // 2.9 mm in 30 s; 17 mm before.
+    let (code, rmse_m, within, causes) = estimate("");
+    assert_eq!((code, causes.as_str()), (0, "[]"));
+    assert!(rmse_m < 0.009 && within > 0.99, "{rmse_m} m, {within} within the bound");
+
+    let precise = "(imu: (gyro_scale_error: 5e-4, gyro_misalignment_rad: 5e-4, accel_scale_error: 5e-4, accel_misalignment_rad: 5e-4))";
+    std::fs::write(here.path().join("precise.ron"), precise).unwrap();
+    let (code, .., causes) = estimate("--calibration precise.ron");
+    assert!(code == 3 && causes.contains("imu_scale"), "{code}: {causes}");
 }

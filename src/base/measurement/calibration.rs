@@ -58,7 +58,8 @@ impl Calibration {
     }
 }
 
-/// Noise of an IMU in Kalibr's model: densities of white noise and of the random walks of the biases.
+/// Errors of an IMU: noise in Kalibr's model (densities of white noise and of the random walks of the biases), scale,
+/// misalignment and limits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImuNoise {
@@ -74,6 +75,14 @@ pub struct ImuNoise {
     pub gyro_turn_on_bias_rad_per_s: f64,
     /// Standard deviation of the accelerometer bias at power-on, m/s^2.
     pub accel_turn_on_bias_m_per_s2: f64,
+    /// Standard deviation of the scale error of each axis of the gyroscope, as a fraction of the rate.
+    pub gyro_scale_error: f64,
+    /// Standard deviation of the misalignment of each axis of the gyroscope towards each other axis, rad.
+    pub gyro_misalignment_rad: f64,
+    /// Standard deviation of the scale error of each axis of the accelerometer, as a fraction of the specific force.
+    pub accel_scale_error: f64,
+    /// Standard deviation of the misalignment of each axis of the accelerometer towards each other axis, rad.
+    pub accel_misalignment_rad: f64,
     /// Measuring range of the gyroscope per axis, rad/s: larger rates saturate.
     pub gyro_limit_rad_per_s: f64,
     /// Measuring range of the accelerometer per axis, m/s^2: larger specific forces saturate.

@@ -3,15 +3,16 @@
 use crate::spec::SolveSpec;
 use crate::window::{Window, WindowSolution};
 use crate::{WarningKind, WindowReport};
+use zsim_base::measurement::ImuNoise;
 use zsim_base::time::Stamp;
 
 /// The report on the solution of the window that ends at `stamp`.
 ///
-/// `moving`: the head moves, so surfaces should have been matched. `elapsed_s`: run time, s.
+/// `imu`: model of the IMU. `moving`: the head moves, so surfaces should have been matched. `elapsed_s`: run time, s.
 pub(super) fn report(
     solved: &WindowSolution,
     window: &Window,
-    spec: &SolveSpec,
+    (spec, imu): (&SolveSpec, &ImuNoise),
     stamp: Stamp,
     moving: bool,
     elapsed_s: f64,
@@ -30,7 +31,7 @@ pub(super) fn report(
         clock_offset_s: window.unknowns.clock.offset_s,
         clock_rate: window.unknowns.clock.rate,
         range_correction_m: window.lidar().range_m,
-        imu_matrix: window.imu_matrix(),
+        imu_matrix: window.imu_matrix(imu),
         speed_m_per_s: window.speed_m_per_s(),
         moving,
         resting: window.is_resting(),

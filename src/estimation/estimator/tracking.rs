@@ -93,7 +93,14 @@ impl Estimator {
         self.clock_offsets.push((self.intake.stamp(window.unknowns.clock.at_s), window.unknowns.clock.offset_s));
         let moving = window.speed_m_per_s() > FAST_MOTION.0 || turns_fast;
         let elapsed_s = solution_s + solved.timing.views_s;
-        self.diagnostics.record(report(solved, window, &self.spec.solve, stamp, moving, elapsed_s));
+        self.diagnostics.record(report(
+            solved,
+            window,
+            (&self.spec.solve, &self.calibration.imu),
+            stamp,
+            moving,
+            elapsed_s,
+        ));
     }
 
     /// Outputs the poses up to `final_until_s`, trajectory time, and forgets the states before them.

@@ -204,6 +204,10 @@ mod tests {
             accel_bias_walk_m_per_s2_per_sqrt_s: 0.0,
             gyro_turn_on_bias_rad_per_s: 0.0,
             accel_turn_on_bias_m_per_s2: 0.0,
+            gyro_scale_error: 0.0,
+            gyro_misalignment_rad: 0.0,
+            accel_scale_error: 0.0,
+            accel_misalignment_rad: 0.0,
             gyro_limit_rad_per_s: f64::INFINITY,
             accel_limit_m_per_s2: f64::INFINITY,
         }

@@ -1,7 +1,7 @@
 //! Tests of the estimator's assumptions: findings, and factors on the error bound.
 
 use super::finding::{Cause, Finding, Status};
-use crate::{Discarded, Warning, WarningKind, WindowReport};
+use crate::{Discarded, MatrixEntry, Warning, WarningKind, WindowReport};
 use zsim_base::time::{Span, Stamp};
 
 /// If more than this fraction of the samples is clipped, a loss of tracking is attributed to it.
@@ -38,8 +38,10 @@ const MISSING_FRACTION: f64 = 0.05;
 const MAX_REPEATED: (usize, usize) = (30, 10);
 /// Correction of all ranges above which a result is degraded or lost, m.
 const RANGE_CORRECTION_M: Limits = Limits { degraded: 0.06, lost: 0.1 };
-/// Entry of the IMU scale and misalignment above which a result is degraded or lost.
-const IMU_SCALE: Limits = Limits { degraded: 0.009, lost: 0.04 };
+/// IMU scale or misalignment over its standard deviation, above which a result is degraded or lost.
+///
+/// Of 18 entries, one is above 4 standard deviations in 0.1 % of the IMUs that are as specified.
+const IMU_SCALE: Limits = Limits { degraded: 4.0, lost: 18.0 };
 /// Implausible drift between the clocks, s/s: no quartz oscillator drifts by so much.
 const CLOCK_RATE: Limits = Limits { degraded: 5e-4, lost: f64::INFINITY };
 /// Implausible speed, m/s: a result of dead reckoning.
@@ -47,6 +49,8 @@ const SPEED_M_PER_S: Limits = Limits { degraded: 60.0, lost: 60.0 };
 
 /// Contradiction, residual (m) and IMU scale up to which the bound is not enlarged.
 const NOMINAL_EVIDENCE: (f64, f64, f64) = (0.4, 0.006, 0.004);
+/// The same for the IMU scale in standard deviations of the model.
+const NOMINAL_MODEL_SIGMAS: f64 = 3.0;
 /// Convergence is evaluated over this number of windows, 20 s at the default step.
 const CONVERGENCE_WINDOWS: usize = 40;
 /// Root mean square of the last corrections of converged windows, m or rad.
@@ -188,8 +192,9 @@ fn window_findings(evidence: &Evidence) -> Vec<Finding> {
     add(over_intervals(windows, residual, RESIDUAL_M), &|residual_m, _, _| Cause::PoorFit { residual_m });
     let both = |interval: &[WindowReport]| {
         // Clipped samples explain an implausible scale.
-        let scale = if is_clipped { 0.0 } else { median(interval.iter().map(|w| w.imu_matrix).collect()) };
-        let lidar = (residual(interval) / RESIDUAL_M.degraded).max(scale / IMU_SCALE.degraded);
+        let scales = interval.iter().map(|w| w.imu_matrix.over_model() / IMU_SCALE.degraded);
+        let scale = if is_clipped { 0.0 } else { median(scales.collect()) };
+        let lidar = (residual(interval) / RESIDUAL_M.degraded).max(scale);
         lidar.min(contradiction(interval) / CONTRADICTION_LIMITS.degraded)
     };
     add(over_intervals(windows, both, INCONSISTENT), &|ratio, _, _| Cause::Inconsistent { ratio });
@@ -270,11 +275,12 @@ fn calibration_findings(windows: &[WindowReport]) -> Vec<Finding> {
         (value > limits.degraded).then_some(Finding { status, cause, from: first.stamp, to: last.stamp })
     };
     let correction_m = last.range_correction_m;
-    let entry = late.iter().map(|window| window.imu_matrix).fold(0.0, f64::max);
+    let entries = late.iter().map(|window| window.imu_matrix);
+    let entry = entries.max_by(|a, b| a.over_model().total_cmp(&b.over_model())).unwrap_or_default();
     let rate = median(late.iter().map(|window| window.clock_rate.abs()).collect());
     [
         of(correction_m.abs(), RANGE_CORRECTION_M, Cause::RangeCorrection { correction_m }),
-        of(entry, IMU_SCALE, Cause::ImuScale { entry }),
+        of(entry.over_model(), IMU_SCALE, Cause::ImuScale { entry }),
         of(rate, CLOCK_RATE, Cause::ClockRate { rate }),
     ]
     .into_iter()
@@ -313,7 +319,9 @@ pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let is_weak = |w: &WindowReport| matches!(w.problem, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_FACTOR } else { 1.0 };
-        let scale = (windows[k].imu_matrix / NOMINAL_EVIDENCE.2).powi(2).min(MAX_SCALE_FACTOR);
+        let MatrixEntry { value, model_sigma } = windows[k].imu_matrix;
+        let nominal = NOMINAL_EVIDENCE.2.max(NOMINAL_MODEL_SIGMAS * model_sigma);
+        let scale = (value / nominal).powi(2).min(MAX_SCALE_FACTOR);
         let late = &windows[(k + 1).saturating_sub(of)..=k];
         let not_converged = not_converged(late, of).max(ill_conditioned(late, of));
         // A contradiction that noise does not explain causes an error that grows faster than linearly.
@@ -369,7 +377,7 @@ mod tests {
             clock_offset_s: 0.003,
             clock_rate: 2e-5,
             range_correction_m: 0.002,
-            imu_matrix: 0.002,
+            imu_matrix: MatrixEntry { value: 0.002, model_sigma: 0.001 },
             speed_m_per_s: 1.0,
             moving: true,
             resting: false,
@@ -418,7 +426,7 @@ mod tests {
         unfit[45..60].iter_mut().for_each(|window| window.residual_rms_m = 0.012);
         assert!(lost_from(&unfit) >= windows[35].stamp);
         // A cabin that moves: the estimated IMU scale absorbs its motion.
-        windows[45..60].iter_mut().for_each(|window| window.imu_matrix = 0.012);
+        windows[45..60].iter_mut().for_each(|window| window.imu_matrix.value = 0.012);
         assert!(lost_from(&windows) >= windows[35].stamp);
     }
 

@@ -1,5 +1,6 @@
 //! Findings about a run, and their effect on the result.
 
+use crate::MatrixEntry;
 use std::fmt;
 use zsim_base::time::Stamp;
 
@@ -112,8 +113,8 @@ pub enum Cause {
     },
     /// The estimated scale or misalignment of the IMU is not plausible.
     ImuScale {
-        /// Largest entry.
-        entry: f64,
+        /// The entry, and its standard deviation according to the model of the IMU.
+        entry: MatrixEntry,
     },
     /// The estimated rate of the clock offset is not plausible.
     ClockRate {
@@ -155,7 +156,7 @@ impl Cause {
             Self::Clipped { fraction } => *fraction,
             Self::Frozen { count, .. } => *count as f64,
             Self::RangeCorrection { correction_m } => correction_m.abs(),
-            Self::ImuScale { entry } => *entry,
+            Self::ImuScale { entry } => entry.value,
             Self::ClockRate { rate } => *rate,
             Self::Uncertain { bound_m } => *bound_m,
             Self::LoopClosure { moved_m } => *moved_m,
@@ -226,7 +227,12 @@ impl fmt::Display for Cause {
             Self::RangeCorrection { correction_m } => {
                 write!(f, "implausible range correction of {:.0} mm", correction_m * 1e3)
             }
-            Self::ImuScale { entry } => write!(f, "implausible IMU scale or misalignment of {:.1} %", entry * 1e2),
+            Self::ImuScale { entry } => write!(
+                f,
+                "implausible IMU scale or misalignment of {:.1} % (standard deviation of its model: {:.2} %)",
+                entry.value * 1e2,
+                entry.model_sigma * 1e2
+            ),
             Self::ClockRate { rate } => write!(f, "implausible drift between the clocks of {:.0} ppm", rate * 1e6),
             Self::Uncertain { bound_m } => {
                 write!(f, "the position error may reach {bound_m:.2} m (99 % bound)")

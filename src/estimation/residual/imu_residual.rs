@@ -1,5 +1,6 @@
 //! Residuals of one IMU interval or sum of intervals, with their derivatives; see `inertial` and `paper` for the equations.
 
+use super::fast_motion::ByErrors;
 use super::rows::{KNOTS, ResidualRow, ResidualSums};
 use super::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::normal_equations::NormalEquations;
@@ -75,7 +76,7 @@ pub(super) struct GyroResidual {
     sum: ResidualSum,
     by_turn: [f64; KNOTS],
     /// By the bias, and by the columns of the scale and misalignment matrix.
-    by_gyro: [Matrix; 4],
+    by_gyro: ByErrors,
     /// By the clock offset and the clock rate; zero if the trajectory is in IMU time.
     by_clock: [Vector; 2],
 }
@@ -93,6 +94,11 @@ impl GyroResidual {
         let w = &interval.gyro;
         let by_gyro = [1.0, w.x, w.y, w.z].map(|reading| terms.map_from_end * (h * reading));
         Self { sum, by_turn, by_gyro, by_clock: [Vector::zeros(); 2] }
+    }
+
+    /// The same residual of states that take the fast changes by the gyroscope's errors.
+    pub(super) fn with_fast_motion(self, by_gyro: ByErrors) -> Self {
+        Self { by_gyro, ..self }
     }
 
     /// The same residual of a trajectory in lidar time; the middle of the interval is `time_s` after the clock's reference.
@@ -130,7 +136,7 @@ pub(super) struct AccelResidual {
     pub by_shift: [f64; KNOTS],
     pub by_turn: [Matrix; KNOTS],
     /// By the bias, and by the columns of the scale and misalignment matrix.
-    pub by_accel: [Matrix; 4],
+    pub by_accel: ByErrors,
     pub by_tilt: Matrix,
     /// By the clock offset and the clock rate; zero if the trajectory is in IMU time.
     pub by_clock: [Vector; 2],
@@ -158,6 +164,11 @@ impl AccelResidual {
             by_tilt: skew(gravity) * h,
             by_clock: [Vector::zeros(); 2],
         }
+    }
+
+    /// The same residual of states that take the fast changes by the accelerometer's errors.
+    pub(super) fn with_fast_motion(self, by_accel: ByErrors) -> Self {
+        Self { by_accel, ..self }
     }
 
     /// Whether another interval belongs to the same span and has a similar sigma.

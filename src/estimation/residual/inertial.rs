@@ -12,7 +12,8 @@
 //! ```text
 //! d R_(k+1) e_w / d(dr_(k+1) - dr_k) = 1 / h      d R_(k+1) e_w / db_w = R_(k+1)
 //! d R_mid e_a / d(dv_(k+1) - dv_k) = 1 / h        d R_mid e_a / d dr_mid = [x]x,  x = (v_(k+1) - v_k) / h - g
-//! d R_(k+1) e_w / dM = R_(k+1) w^T, row by row, M the gyroscope's scale errors and misalignments
+//! d R_(k+1) e_w / dM = R_(k+1) w^T, row by row, M the gyroscope's scale errors and misalignments, of which [`FastMotion`]
+//!     takes the part that is too fast for the spline
 //! d R_mid e_a / dM = R_mid f^T, row by row, M the accelerometer's
 //! d R_mid e_a / db_a = R_mid                      d R_mid e_a / dgamma = [g]x (e_x, e_y),  g' = exp(gamma) g
 //! ```
@@ -21,6 +22,7 @@
 //! correction can follow the effect of a bias.
 
 use super::Layout;
+use super::fast_motion::FastMotion;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial};
 use super::rows::ResidualSums;
 use crate::normal_equations::NormalEquations;
@@ -65,6 +67,7 @@ pub(crate) fn add_inertial(
     equations: &mut NormalEquations,
     layout: &Layout,
     nodes: &Nodes<'_>,
+    fast_motion: &FastMotion,
     biases: &Biases,
     gravity: &Vector,
 ) {
@@ -76,8 +79,10 @@ pub(crate) fn add_inertial(
         let interval = &if near_steps[k] { with_step_margin(interval) } else { *interval };
         let terms = Inertial::between(&states[k], &states[k + 1], interval, biases, gravity);
         let (start, end) = (&bases[k], &bases[k + 1]);
-        GyroResidual::of(&terms, start, end, interval).add_to(&mut each, equations, layout);
+        let gyro = GyroResidual::of(&terms, start, end, interval);
+        gyro.with_fast_motion(fast_motion.turn_residual(k)).add_to(&mut each, equations, layout);
         let single = AccelResidual::of(&terms, start, end, interval, gravity);
+        let single = single.with_fast_motion(fast_motion.velocity_residual(k));
         single.add_to(SINGLE_SAMPLE_FACTOR, &mut each, equations, layout);
         if let Some(sum) = sum.as_mut().filter(|sum| sum.can_be_summed_with(&single)) {
             sum.append(&single);
@@ -160,7 +165,8 @@ mod tests {
         fn equations(&self, layout: &Layout) -> NormalEquations {
             let mut equations = NormalEquations::new(layout.size());
             let nodes = Nodes { states: &self.states, bases: &self.bases(), intervals: &self.intervals };
-            add_inertial(&mut equations, layout, &nodes, &self.biases, &self.gravity);
+            let fast_motion = FastMotion::of(&nodes, layout);
+            add_inertial(&mut equations, layout, &nodes, &fast_motion, &self.biases, &self.gravity);
             equations
         }
 
@@ -228,19 +234,23 @@ mod tests {
     fn whitened(case: &Case, x: &DVector<f64>) -> DVector<f64> {
         let border = layout().border();
         let three = |at: usize| Vector::new(x[border + at], x[border + at + 1], x[border + at + 2]);
-        let moved = |(state, basis): (&State, Basis)| {
-            let correction = Correction::of_spline(&basis, 2, x.as_slice());
+        let bases = case.bases();
+        let nodes = Nodes { states: &case.states, bases: &bases, intervals: &case.intervals };
+        let fast_motion = FastMotion::of(&nodes, &layout());
+        let moved = |(k, (state, basis)): (usize, (&State, &Basis))| {
+            let correction = Correction::of_spline(basis, 2, x.as_slice());
+            let fast = fast_motion.at(k, &x.as_slice()[border..]);
             State {
-                rotation: Rotation::from_scaled_axis(correction.rotation) * state.rotation,
-                position: state.position + correction.translation,
-                velocity: state.velocity + correction.velocity,
+                rotation: Rotation::from_scaled_axis(correction.rotation + fast.rotation) * state.rotation,
+                position: state.position + correction.translation + fast.translation,
+                velocity: state.velocity + correction.velocity + fast.velocity,
             }
         };
         let matrix = |at: usize| Matrix::from_fn(|r, c| x[border + at + 3 * r + c]);
         let scale_misalignment = ImuScaleMisalignment { gyro: matrix(GYRO_MATRIX), accel: matrix(ACCEL_MATRIX) };
         let tilt = Vector::new(x[border + GRAVITY], x[border + GRAVITY + 1], 0.0);
         let moved = Case {
-            states: case.states.iter().zip(case.bases()).map(moved).collect(),
+            states: case.states.iter().zip(&bases).enumerate().map(moved).collect(),
             intervals: case.intervals.iter().map(|interval| interval.corrected_by(&scale_misalignment)).collect(),
             biases: Biases { gyro: case.biases.gyro + three(GYRO_BIAS), accel: case.biases.accel + three(ACCEL_BIAS) },
             gravity: Rotation::from_scaled_axis(tilt) * case.gravity,

@@ -1,6 +1,7 @@
 //! Residuals of the window with derivatives: IMU, matched surfels, priors.
 
 pub(super) mod contradiction;
+mod fast_motion;
 mod imu_residual;
 pub(super) mod inertial;
 mod knot_span;
@@ -11,6 +12,7 @@ pub(super) mod prior;
 mod rows;
 pub(super) mod sums;
 
+pub(super) use fast_motion::FastMotion;
 pub(super) use layout::{
     ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, Layout,
 };

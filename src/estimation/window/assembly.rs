@@ -5,7 +5,7 @@ use super::equations::{Displacement, WeightedMatches, Workspace};
 use super::linearised::Linearised;
 use crate::nominal::Correction;
 use crate::residual::inertial::{Nodes, add_inertial};
-use crate::residual::{Layout, paper, prior};
+use crate::residual::{FastMotion, Layout, paper, prior};
 use crate::spec::Formulation;
 use crate::spline::Basis;
 use crate::timing::{Stopwatch, Timing};
@@ -18,14 +18,20 @@ const REST_VELOCITY_SIGMA: f64 = 0.003;
 const REST_RATE_SIGMA: f64 = 0.003;
 
 impl Window {
-    /// The order of the window's unknowns; also computes the spline bases at the nodes from `first` on.
+    /// The order of the window's unknowns; also computes the spline bases and the fast motion at the nodes from `first` on.
     pub(super) fn layout(&mut self, first: usize) -> Layout {
         let spacing = self.spec.knot_spacing_s;
-        self.workspace.bases.clear();
-        self.workspace.bases.extend(self.nominal.times_s()[first..].iter().map(|t| Basis::at(*t, spacing)));
+        let Workspace { bases, fast_motion, .. } = &mut self.workspace;
+        bases.clear();
+        bases.extend(self.nominal.times_s()[first..].iter().map(|t| Basis::at(*t, spacing)));
         let first_knot = Basis::at(self.start.u_s, spacing).first;
         let last_knot = Basis::at(self.nominal.end_s(), spacing).first + 3;
-        Layout { first_knot, knots: (last_knot - first_knot + 1) as usize }
+        let layout = Layout { first_knot, knots: (last_knot - first_knot + 1) as usize };
+        if self.spec.formulation == Formulation::ImuTime {
+            let (states, intervals) = (&self.nominal.states()[first..], &self.nominal.intervals()[first..]);
+            *fast_motion = FastMotion::of(&Nodes { states, bases, intervals }, &layout);
+        }
+        layout
     }
 
     /// Solves the window linearised `at` the current states, whose corrections so far sum up to `total`.
@@ -45,7 +51,7 @@ impl Window {
         let ((), sums) = rayon::join(|| self.assemble_inertial(first, layout, total), || weighted.sums(extrinsics));
         sums.add_to(&mut self.workspace.equations, layout);
         timing.equations_s += watch.lap_s();
-        let Workspace { equations, factor, bases } = &mut self.workspace;
+        let Workspace { equations, factor, bases, .. } = &mut self.workspace;
         equations.factor(factor).ok()?;
         let x = equations.solve(factor);
         let moved = Displacement::max_of(bases.iter().map(|basis| {
@@ -58,13 +64,13 @@ impl Window {
 
     /// Resets the equations and adds the terms that do not depend on matches: IMU and priors.
     fn assemble_inertial(&mut self, first: usize, layout: &Layout, total: &[f64]) {
-        let Workspace { equations, bases, .. } = &mut self.workspace;
+        let Workspace { equations, bases, fast_motion, .. } = &mut self.workspace;
         equations.reset(layout.size());
         let states = self.nominal.states();
         let nodes = Nodes { states: &states[first..], bases, intervals: &self.nominal.intervals()[first..] };
         let Unknowns { biases, gravity, clock, .. } = &self.unknowns;
         match self.spec.formulation {
-            Formulation::ImuTime => add_inertial(equations, layout, &nodes, biases, gravity),
+            Formulation::ImuTime => add_inertial(equations, layout, &nodes, fast_motion, biases, gravity),
             Formulation::Paper => {
                 let times_s: Vec<f64> = self.nominal.times_s()[first..].iter().map(|t| t - clock.at_s).collect();
                 paper::add_inertial(equations, layout, &nodes, &times_s, biases, gravity);

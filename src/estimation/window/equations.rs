@@ -2,9 +2,9 @@
 
 use super::correspondence::{Counterpart, Match, Matches};
 use crate::normal_equations::{Factor, NormalEquations};
-use crate::residual::Layout;
 use crate::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
 use crate::residual::sums::{Coupling, SpanSums, SurfelSums};
+use crate::residual::{FastMotion, Layout};
 use crate::spec::SolveSpec;
 use crate::spline::Basis;
 use crate::surfel::PlacedSurfel;
@@ -18,11 +18,14 @@ pub(super) struct Workspace {
     pub equations: NormalEquations,
     pub factor: Factor,
     pub bases: Vec<Basis>,
+    /// By the IMU's scale errors and misalignments; empty if the trajectory is in lidar time.
+    pub fast_motion: FastMotion,
 }
 
 impl Default for Workspace {
     fn default() -> Self {
-        Self { equations: NormalEquations::new(0), factor: Factor::default(), bases: Vec::new() }
+        let (equations, factor) = (NormalEquations::new(0), Factor::default());
+        Self { equations, factor, bases: Vec::new(), fast_motion: FastMotion::default() }
     }
 }
 

@@ -22,12 +22,13 @@ use super::initial::{InitialState, RestReadings, StateBeforeGap};
 use super::matching::Matcher;
 use super::nominal::Nominal;
 use super::observed::ObservedPatch;
+use super::output::MatrixEntry;
 use super::residual::contradiction::contradiction;
 use super::residual::inertial::SHORT_GAP_S;
 use super::residual::prior::Start;
 use super::spec::EstimatorSpec;
 use super::standstill::{Standstill, standstill};
-use super::strapdown::Interval;
+use super::strapdown::{ImuScaleMisalignment, Interval};
 use super::surfel::{Detail, FINE, Patch, PlacementState, Surfel, SurfelBuilder, TimedReturn};
 use super::timing::{Stopwatch, Timing};
 use super::unknowns::Unknowns;
@@ -38,7 +39,7 @@ use readings::Readings;
 use rests::Rests;
 use std::collections::VecDeque;
 use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
-use zsim_base::measurement::LidarCorrection;
+use zsim_base::measurement::{ImuNoise, LidarCorrection};
 
 /// The head may move for this time before the IMU shows it, s.
 const REST_MARGIN_S: f64 = 0.3;
@@ -394,9 +395,12 @@ impl Window {
         Some(SeenSegment { patches, lidar: self.lidar(), seconds: self.spec.step_s })
     }
 
-    /// The largest estimated scale error or misalignment of the IMU.
-    pub(super) fn imu_matrix(&self) -> f64 {
-        self.unknowns.scale_misalignment.gyro.amax().max(self.unknowns.scale_misalignment.accel.amax())
+    /// The estimated scale error or misalignment of the IMU that is the largest relative to the `model` of the IMU.
+    pub(super) fn imu_matrix(&self, model: &ImuNoise) -> MatrixEntry {
+        let sigmas = ImuScaleMisalignment::sigmas_of(model);
+        let all = self.unknowns.scale_misalignment.entries().zip(sigmas.entries());
+        let entries = all.map(|(estimated, model_sigma)| MatrixEntry { value: estimated.abs(), model_sigma });
+        entries.max_by(|a, b| a.over_model().total_cmp(&b.over_model())).unwrap_or_default()
     }
 
     /// The estimated corrections of the lidar calibration.

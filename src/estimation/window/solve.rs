@@ -2,7 +2,7 @@
 
 use super::Window;
 use super::correspondence::{Counterpart, Match, Matches, Neighbours};
-use super::equations::Robust;
+use super::equations::{Robust, Workspace};
 use super::linearised::Linearised;
 use crate::nominal::Correction;
 use crate::residual::Layout;
@@ -146,12 +146,14 @@ impl Window {
 
     /// Applies a solution to the window's unknowns.
     fn apply(&mut self, x: &[f64], first: usize, layout: &Layout, total: &mut [f64]) {
-        let bases = &self.workspace.bases;
-        self.nominal.correct(first, |node| Correction::of_spline(&bases[node - first], layout.first_knot, x));
+        let (Workspace { bases, fast_motion, .. }, border) = (&self.workspace, &x[layout.border()..]);
+        self.nominal.correct(first, |node| {
+            let slow = Correction::of_spline(&bases[node - first], layout.first_knot, x);
+            slow.plus(&fast_motion.at(node - first, border))
+        });
         for (sum, term) in total.iter_mut().zip(x) {
             *sum += term;
         }
-        let border = &x[layout.border()..];
         self.unknowns = self.unknowns.plus(border);
         self.readings.update(&mut self.nominal, &self.unknowns, border);
         self.border.add_step(border, &self.workspace.factor);

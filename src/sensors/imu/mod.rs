@@ -85,6 +85,10 @@ impl Imu {
             accel_bias_walk_m_per_s2_per_sqrt_s: self.accel.expected_walk(),
             gyro_turn_on_bias_rad_per_s: self.gyro.turn_on,
             accel_turn_on_bias_m_per_s2: self.accel.turn_on,
+            gyro_scale_error: self.gyro.scale,
+            gyro_misalignment_rad: self.gyro.misalignment,
+            accel_scale_error: self.accel.scale,
+            accel_misalignment_rad: self.accel.misalignment,
             gyro_limit_rad_per_s: self.gyro.limit,
             accel_limit_m_per_s2: self.accel.limit,
         }
