@@ -42,10 +42,10 @@ struct MergeArguments {
     /// The estimator's settings, a name under specs/estimators/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     estimator: String,
-    /// File for the merged map; if it exists, a number is added to the name
+    /// File for the merged map
     #[arg(long, short, value_name = "C.ply")]
     out: PathBuf,
-    /// Write the file even if it exists
+    /// Replace the file if it exists
     #[arg(long)]
     force: bool,
 }
@@ -53,11 +53,12 @@ struct MergeArguments {
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     let Command::Merge(merge) = &arguments.command;
     let estimator = zsim_estimation::load(&merge.estimator)?;
-    let out = output::file(&merge.out, merge.force)?;
+    let out = &merge.out;
+    output::check_file(out, merge.force)?;
     let estimator_file = spec_file(Kind::Estimator, &merge.estimator);
     let inputs: Vec<PathBuf> = [merge.first.clone(), merge.second.clone()].into_iter().chain(estimator_file).collect();
-    output::check_not_inputs(&inputs, std::slice::from_ref(&out))?;
-    let merged = zsim_study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, &out)?;
+    output::check_not_inputs(&inputs, std::slice::from_ref(out))?;
+    let merged = zsim_study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
     let (position, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());

@@ -110,15 +110,25 @@ pub(super) fn lock_file(file: &File) -> bool {
     !cfg!(unix) || is_locked(&file.try_lock())
 }
 
-/// A new file for results: `wanted`, or `wanted` with a number before its ending.
-pub(super) fn file(wanted: &Path, force: bool) -> anyhow::Result<PathBuf> {
+/// Checks that a file for results can be written to `wanted`, and creates its folder.
+///
+/// # Errors
+/// When a folder has this name, or without `force` when a file has it.
+pub(super) fn check_file(wanted: &Path, force: bool) -> anyhow::Result<()> {
     create_parent(wanted)?;
-    let mut candidates = candidates(wanted);
-    match candidates.find(|candidate| force || !candidate.exists()) {
-        Some(path) if path.is_dir() => bail!("{} is a folder; a file's name is needed", path.display()),
-        Some(path) => Ok(path),
-        None => bail!("{} and thousands of numbered files exist already", wanted.display()),
-    }
+    ensure!(!wanted.is_dir(), "{} is a folder; a file's name is needed", wanted.display());
+    ensure!(force || !exists(wanted), file_exists(wanted));
+    Ok(())
+}
+
+/// Whether a name is taken, also by a link to nothing.
+pub(super) fn exists(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
+/// The error for a file that would be replaced.
+pub(super) fn file_exists(path: &Path) -> String {
+    format!("{} exists: pass --force to replace it, or another name", path.display())
 }
 
 /// Creates the folder that `wanted` will be in.
@@ -285,13 +295,14 @@ mod tests {
     }
 
     #[test]
-    fn an_existing_file_is_not_replaced_but_numbered() {
+    fn an_existing_file_is_replaced_with_force_only() {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("a.b.mcap");
-        assert_eq!(file(&wanted, false).unwrap(), wanted);
+        assert!(check_file(&wanted, false).is_ok());
         std::fs::write(&wanted, "").unwrap();
-        assert_eq!(file(&wanted, false).unwrap(), here.path().join("a.b-2.mcap"));
-        assert_eq!(file(&wanted, true).unwrap(), wanted);
-        assert!(file(here.path(), true).is_err());
+        let error = check_file(&wanted, false).unwrap_err().to_string();
+        assert!(error.contains("a.b.mcap exists: pass --force"), "{error}");
+        assert!(check_file(&wanted, true).is_ok());
+        assert!(check_file(here.path(), true).is_err());
     }
 }

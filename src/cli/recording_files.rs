@@ -1,8 +1,8 @@
 //! The files of a simulated recording, reserved before anything is computed.
 
-use super::output::{candidates, check_not_inputs, create_parent, in_use, lock_file};
+use super::output::{candidates, check_not_inputs, create_parent, exists, file_exists, in_use, lock_file};
 use super::usage::Usage;
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -47,11 +47,10 @@ pub(super) struct RecordingFiles {
 }
 
 impl RecordingFiles {
-    /// Reserves `wanted` and its `companions`. Where a file of these names exists a number is added to all names, unless `force`
-    /// permits to replace them. No file of `inputs` is ever replaced.
+    /// Reserves `wanted` and its `companions`. No file of `inputs` is ever replaced.
     ///
     /// # Errors
-    /// When the ending is that of another format, two of the files would be one, an input would be replaced, another process
+    /// When without `force` one of the files or another companion exists, the ending is that of another format, two of the files would be one, an input would be replaced, another process
     /// writes the files, or they cannot be created.
     pub fn reserve(wanted: &Path, companions: &[Companion], force: bool, inputs: &[PathBuf]) -> anyhow::Result<Self> {
         if let Some(same) = Companion::ALL.iter().find(|companion| is_same_name(&companion.of(wanted), wanted)) {
@@ -70,8 +69,12 @@ impl RecordingFiles {
         create_parent(wanted)?;
         let outputs: Vec<PathBuf> =
             [wanted.to_owned()].into_iter().chain(Companion::ALL.map(|companion| companion.of(wanted))).collect();
-        if !(force && outputs.iter().any(|path| path.exists())) {
-            return Self::first_free(wanted, companions, None);
+        let existing = outputs.iter().find(|path| exists(path));
+        if let Some(existing) = existing.filter(|_| !force) {
+            bail!(if is_locked(existing) { in_use(wanted) } else { file_exists(existing) });
+        }
+        if existing.is_none() {
+            return Self::create(wanted, companions, None)?.ok_or_else(|| anyhow!(file_exists(wanted)));
         }
         ensure!(!is_locked(wanted), in_use(wanted));
         let truth = Companion::Truth.of(wanted);
@@ -90,48 +93,37 @@ impl RecordingFiles {
             ensure!(!path.is_dir(), "{} is a folder; a file's name is needed", path.display());
         }
         check_not_inputs(inputs, &outputs)?;
-        let ending = wanted.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
-        Self::first_free(&wanted.with_extension(format!("partial{ending}")), companions, Some(wanted))
+        Self::create_partial(wanted, companions)
     }
 
-    /// Creates the files under the first name, `wanted` or `wanted` with a number, of which no file exists.
-    ///
-    /// [`finish`](Self::finish) then moves them to `replaces`, if given.
-    fn first_free(wanted: &Path, companions: &[Companion], replaces: Option<&Path>) -> anyhow::Result<Self> {
-        for recording in candidates(wanted) {
-            let Some(lock) = create_locked(&recording)? else {
-                // A run that was killed leaves an unlocked file.
-                if let Some(replaced) = replaces.filter(|_| is_locked(&recording)) {
-                    bail!(in_use(replaced));
-                }
-                continue;
-            };
-            // Dropped, it removes what it has created.
-            let replaces = replaces.map(Path::to_owned);
-            let mut files = Self { recording, companions: vec![], replaces, is_finished: false, _lock: lock };
-            if files.reserves_all(companions)? {
+    /// Creates the files that will replace `replaced`, under the first temporary name of which no file exists.
+    fn create_partial(replaced: &Path, companions: &[Companion]) -> anyhow::Result<Self> {
+        let ending = replaced.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+        for recording in candidates(&replaced.with_extension(format!("partial{ending}"))) {
+            // A run that was killed leaves an unlocked file.
+            ensure!(!is_locked(&recording), in_use(replaced));
+            if let Some(files) = Self::create(&recording, companions, Some(replaced))? {
                 return Ok(files);
             }
         }
-        bail!("{} and thousands of numbered files exist already", wanted.display());
+        bail!("thousands of partial files of {} exist already", replaced.display());
     }
 
-    /// Creates the files next to the recording; `false` if a file of such a name exists, also one that is not written.
-    fn reserves_all(&mut self, companions: &[Companion]) -> anyhow::Result<bool> {
-        for companion in Companion::ALL {
-            let path = companion.of(&self.recording);
-            if !companions.contains(&companion) {
-                if path.exists() {
-                    return Ok(false);
-                }
-                continue;
+    /// Creates the files; `None` if one of their names is taken.
+    ///
+    /// [`finish`](Self::finish) then moves them to `replaces`, if given.
+    fn create(recording: &Path, companions: &[Companion], replaces: Option<&Path>) -> anyhow::Result<Option<Self>> {
+        let Some(lock) = create_locked(recording)? else { return Ok(None) };
+        let (recording, replaces) = (recording.to_owned(), replaces.map(Path::to_owned));
+        // Dropped, it removes what it has created.
+        let mut files = Self { recording, companions: vec![], replaces, is_finished: false, _lock: lock };
+        for companion in companions {
+            if !is_created(&companion.of(&files.recording))? {
+                return Ok(None);
             }
-            if !is_created(&path)? {
-                return Ok(false);
-            }
-            self.companions.push(companion);
+            files.companions.push(*companion);
         }
-        Ok(true)
+        Ok(Some(files))
     }
 
     /// Where the recording is written.
@@ -246,18 +238,19 @@ mod tests {
         let here = tempfile::tempdir().unwrap();
         let wanted = here.path().join("run.mcap");
         std::fs::write(here.path().join("run.tum"), "foreign").unwrap();
-        std::fs::write(here.path().join("run-3.urdf"), "foreign").unwrap();
-        let first = RecordingFiles::reserve(&wanted, ALL, false, &[]).unwrap();
-        let second = RecordingFiles::reserve(&wanted, &[Companion::Truth], false, &[]).unwrap();
-        assert_eq!(first.recording(), here.path().join("run-2.mcap"));
-        assert_eq!(first.companion(Companion::Layout), Some(here.path().join("run-2.foxglove.json")));
-        assert_eq!(second.recording(), here.path().join("run-4.mcap"), "the foreign model would seem to be of it");
-        assert_eq!(second.companion(Companion::Truth), Some(here.path().join("run-4.tum")));
-        drop((first, second));
+        std::fs::write(here.path().join("other.urdf"), "foreign").unwrap();
+        for (name, companions, taken) in [
+            ("run.mcap", ALL, "run.tum exists"),
+            ("run.mcap", &[], "run.tum exists"),
+            ("other.mcap", &[Companion::Truth], "other.urdf exists"),
+        ] {
+            let error = RecordingFiles::reserve(&here.path().join(name), companions, false, &[]).err().unwrap();
+            assert!(error.to_string().contains(taken), "{error}");
+        }
+        let free = RecordingFiles::reserve(&here.path().join("free.mcap"), ALL, false, &[]).unwrap();
+        assert_eq!(free.companion(Companion::Layout), Some(here.path().join("free.foxglove.json")));
+        drop(free);
         assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 2, "empty files are removed");
-        let without_truth = RecordingFiles::reserve(&wanted, &[], false, &[]).unwrap();
-        assert_eq!(without_truth.recording(), here.path().join("run-2.mcap"));
-        assert_eq!(without_truth.companion(Companion::Truth), None);
         std::fs::write(&wanted, "old").unwrap();
         assert!(RecordingFiles::reserve(&wanted, &[], true, &[]).is_err(), "the truth next to it is another's");
         for name in ["y.tum", "y.TUM", "y.urdf", "y.bag", "y.DB3"] {

@@ -79,7 +79,8 @@ impl Files {
             world.mesh_files().iter().cloned().chain(spec_file(Kind::Scene, &self.scene)).collect();
         output::check_not_inputs(&inputs, std::slice::from_ref(&self.file))?;
         world.notes().iter().for_each(|note| message::note(note));
-        Ok((world, output::file(&self.file, self.force)?))
+        output::check_file(&self.file, self.force)?;
+        Ok((world, self.file.clone()))
     }
 }
 

@@ -28,8 +28,8 @@ pub(super) struct Arguments {
     scene: String,
     #[command(flatten)]
     scenario: ScenarioArguments,
-    /// The recording; next to it: .tum, the true trajectory; .foxglove.json, a layout of Foxglove; .urdf, the head on its spring. If
-    /// one of these exists, a number is added to all names [default: <scene>.mcap]
+    /// The recording; next to it: .tum, the true trajectory; .foxglove.json, a layout of Foxglove; .urdf, the head on its spring
+    /// [default: <scene>.mcap]
     #[arg(long, short, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
     /// Write the recording into this new folder as rosbag2 does, with metadata.yaml, for `ros2 bag play DIR`
