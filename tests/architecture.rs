@@ -12,8 +12,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules of the room `base`, in order: each may use the modules before it.
-const BASE: [&str; 10] =
-    ["time", "random", "files", "printable", "geometry", "signal", "spec", "ply", "surfel_map", "measurement"];
+const BASE: [&str; 11] = [
+    "time",
+    "random",
+    "files",
+    "printable",
+    "similar",
+    "geometry",
+    "signal",
+    "spec",
+    "ply",
+    "surfel_map",
+    "measurement",
+];
 
 /// The rooms, in order, each with the rooms that it may use.
 const ROOMS: [(&str, &[&str]); 14] = [

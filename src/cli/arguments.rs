@@ -66,7 +66,7 @@ pub(super) struct ScenarioArguments {
     #[arg(long, value_name = "NAME")]
     route: Option<String>,
     /// Duration: 120s, 2min, 90 [default: 120s]
-    #[arg(long, value_name = "TIME", value_parser = quantity::seconds)]
+    #[arg(long, value_name = "TIME", value_parser = quantity::seconds, allow_hyphen_values = true)]
     duration: Option<f64>,
     /// Random seed [default: 1]
     #[arg(long, value_name = "N")]

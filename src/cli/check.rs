@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::Path;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, Tree, find, kind_by_keys};
 use zsim_dynamics::{HeadModel, HeadSpec};
 use zsim_elasticity::{ElasticityError, SpringSpec};
 use zsim_estimation::{EstimationError, EstimatorSpec};
@@ -101,19 +101,16 @@ fn check(file: &str) -> Result<Checked, SpecError> {
     kind_by_trying(&source)
 }
 
-/// The kind whose parser accepts the text, checked; if none does, the error with the largest line number.
+/// The kind whose parser accepts the text, checked; if none does, the error of the kind that has the most of its keys.
 fn kind_by_trying(source: &Source) -> Result<Checked, SpecError> {
-    let mut farthest: Option<SpecError> = None;
-    for kind in KINDS {
-        match parse_as(kind, source) {
-            Ok(()) => return build(kind, source).map(|warnings| (kind, warnings)),
-            Err(error) => {
-                let is_farther = farthest.as_ref().is_none_or(|far| error.line_and_column() > far.line_and_column());
-                farthest = if is_farther { Some(error) } else { farthest };
-            }
-        }
+    if let Some(kind) = KINDS.into_iter().find(|kind| parse_as(*kind, source).is_ok()) {
+        return build(kind, source).map(|warnings| (kind, warnings));
     }
-    Err(farthest.unwrap_or_else(|| SpecError::plain(source.name.clone(), "is neither a scene nor a spec")))
+    let error = match kind_by_keys(source) {
+        Some(found) => parse_as(found.kind, source).err(),
+        None => Tree::read(source).err(),
+    };
+    Err(error.unwrap_or_else(|| SpecError::plain(source.name.clone(), "is neither a scene nor a spec")))
 }
 
 fn kind_by_folder(file: &str) -> Option<Kind> {

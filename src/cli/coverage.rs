@@ -33,10 +33,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
     imu: String,
     /// Duration of the observation: 30s, 2min, 90
-    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = quantity::seconds)]
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = quantity::seconds, allow_hyphen_values = true)]
     duration: f64,
     /// Start of the observation [default: after the initial rest of the motion]
-    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds)]
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds, allow_hyphen_values = true)]
     from: f64,
     /// Random seed of the motion
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -3,7 +3,7 @@
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
 use super::usage::Usage;
-use super::{Completion, output};
+use super::{Completion, output, quantity};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -30,14 +30,15 @@ pub(super) struct Arguments {
     head: String,
     #[command(flatten)]
     out: OutArguments,
-    /// Maximum frequency, Hz
-    #[arg(long, value_name = "HZ", default_value_t = 10.0)]
+    /// Maximum frequency: 10Hz, 10
+    #[arg(long, value_name = "HZ", default_value = "10Hz", value_parser = quantity::hertz, allow_hyphen_values = true)]
     up_to: f64,
     /// Period of the multisine, s: the line spacing is 2 over it [default: two lines in the narrowest peak]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "TIME", value_parser = quantity::seconds, allow_hyphen_values = true)]
     period: Option<f64>,
     /// RMS angular rate of the base about an axis, degrees/s; along an axis, 0.1 m/s^2 for each degree/s
-    #[arg(long, value_name = "DEG/S", default_value_t = 0.1)]
+    #[arg(long, value_name = "DEG/S", default_value = "0.1deg/s", value_parser = quantity::degrees_per_second,
+        allow_hyphen_values = true)]
     amplitude: f64,
     /// Quantity compared along x, y and z
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
@@ -49,14 +50,14 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 4)]
     realisations: usize,
     /// Time step of the simulation, s
-    #[arg(long, value_name = "S", default_value_t = 1e-3)]
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = quantity::seconds, allow_hyphen_values = true)]
     step: f64,
     /// Random seed of the phases
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Also measure resonance and gain at these rotation amplitudes of the head, degrees RMS; the base is
     /// excited about x and y, and along x and y
-    #[arg(long, value_name = "DEG,...", value_delimiter = ',', num_args = 0.., default_missing_value = "0.2,2,5,10,15,20")]
+    #[arg(long, value_name = "DEG,...", value_parser = quantity::degrees, value_delimiter = ',', num_args = 0.., default_missing_value = "0.2,2,5,10,15,20")]
     swing: Option<Vec<f64>>,
 }
 

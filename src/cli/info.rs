@@ -17,7 +17,7 @@ pub(super) struct Arguments {
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Minimum gap between messages of a topic that is reported
-    #[arg(long, value_name = "TIME", default_value = "0.5s", value_parser = quantity::seconds)]
+    #[arg(long, value_name = "TIME", default_value = "0.5s", value_parser = quantity::seconds, allow_hyphen_values = true)]
     gap: f64,
 }
 

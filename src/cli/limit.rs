@@ -1,6 +1,7 @@
 //! Limits of the errors of a trajectory, `position_rmse=5mm`.
 
 use serde_json::{Map, Value};
+use zsim_base::similar::did_you_mean;
 
 /// Figures that can have a limit, without their unit, with the end of their key.
 const FIGURES: [(&str, &[Dimension]); 11] = [
@@ -72,7 +73,8 @@ impl Limit {
         let name = name.trim();
         let Some((_, dimensions)) = FIGURES.iter().find(|(figure, _)| *figure == name) else {
             let names: Vec<&str> = FIGURES.iter().map(|(figure, _)| *figure).collect();
-            return Err(format!("`{name}` is not a figure with a limit: use one of {}", names.join(", ")));
+            let question = did_you_mean(name, names.iter().copied()).map_or_else(String::new, |q| format!(" {q}"));
+            return Err(format!("`{name}` is not a figure with a limit:{question} use one of {}", names.join(", ")));
         };
         let value = value.trim();
         let unit_at = value.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(value.len());

@@ -1,25 +1,65 @@
-//! Parses durations and lengths with units.
+//! Parses durations, lengths, angles and frequencies with units.
 
 /// Maximum duration on the command line, s (30 years); most commands have lower limits.
 const MAX_S: f64 = 1e9;
+/// Maximum magnitude of a length on the command line, m.
+const MAX_M: f64 = 1e5;
+/// Maximum magnitude of an angle on the command line, degrees.
+const MAX_DEG: f64 = 1e6;
+/// Maximum frequency on the command line, Hz.
+const MAX_HZ: f64 = 1e9;
+
+/// A kind of quantity: its name with article, an example, and its units with their factors.
+struct Quantity {
+    noun: &'static str,
+    example: &'static str,
+    units: &'static [(&'static str, f64)],
+}
+
+const DURATION: Quantity = Quantity {
+    noun: "a duration",
+    example: "120s or 2min",
+    units: &[("", 1.0), ("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("min", 60.0), ("m", 60.0), ("h", 3600.0)],
+};
+const LENGTH: Quantity =
+    Quantity { noun: "a length", example: "1.2m or 80cm", units: &[("", 1.0), ("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
+const ANGLE: Quantity = Quantity {
+    noun: "an angle",
+    example: "2deg or 0.1rad",
+    units: &[
+        ("", 1.0),
+        ("deg", 1.0),
+        ("°", 1.0),
+        ("rad", 180.0 / std::f64::consts::PI),
+        ("mrad", 0.18 / std::f64::consts::PI),
+    ],
+};
+const FREQUENCY: Quantity = Quantity {
+    noun: "a frequency",
+    example: "2Hz or 500mHz",
+    units: &[("", 1.0), ("Hz", 1.0), ("hz", 1.0), ("mHz", 1e-3), ("kHz", 1e3)],
+};
+
+impl Quantity {
+    /// Returns the value of a number and a unit; without unit, the first unit applies.
+    fn parse(&self, text: &str) -> Result<f64, String> {
+        let text = text.trim();
+        let is_unit = |c: char| (c.is_alphabetic() && c != 'e' && c != 'E') || c == '°';
+        let (number, unit) = text.split_at(text.find(is_unit).unwrap_or(text.len()));
+        let Self { noun, example, units } = self;
+        let number = number.trim().parse::<f64>();
+        let number =
+            number.map_err(|_| format!("`{text}` is not {noun}: write a number and a unit, as in {example}"))?;
+        let factor = units.iter().find(|(known, _)| *known == unit.trim()).map(|(_, factor)| *factor);
+        let of = noun.trim_start_matches("a ").trim_start_matches("an ");
+        let factor = factor.ok_or_else(|| format!("`{unit}` is not a unit of {of}: write for example {example}"))?;
+        Ok(number * factor)
+    }
+}
 
 /// Parses a duration such as `120s`, `2min`, `1.5h`, `250ms` or `90`; returns seconds.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    let unit_at = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
-    let (number, unit) = text.split_at(unit_at);
-    let number: f64 = number
-        .trim()
-        .parse()
-        .map_err(|_| format!("`{text}` is not a duration: write a number and a unit, as in 120s or 2min"))?;
-    let factor = match unit {
-        "" | "s" | "sec" => 1.0,
-        "ms" => 1e-3,
-        "min" | "m" => 60.0,
-        "h" => 3600.0,
-        _ => return Err(format!("`{unit}` is not a unit of time: use ms, s, min or h, as in 120s or 2min")),
-    };
-    let seconds = number * factor;
+    let seconds = DURATION.parse(text)?;
     if seconds > 0.0 && seconds <= MAX_S {
         Ok(seconds)
     } else {
@@ -27,25 +67,31 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Maximum magnitude of a length on the command line, m.
-const MAX_M: f64 = 1e5;
-
 /// Parses a length such as `1.2m`, `80cm`, `900mm` or `1.2`; returns metres.
 pub(super) fn metres(text: &str) -> Result<f64, String> {
-    let text = text.trim();
-    let unit_at = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(text.len());
-    let (number, unit) = text.split_at(unit_at);
-    let number = number.trim().parse::<f64>();
-    let number =
-        number.map_err(|_| format!("`{text}` is not a length: write a number and a unit, as in 1.2m or 80cm"))?;
-    let factor = match unit {
-        "" | "m" => 1.0,
-        "cm" => 1e-2,
-        "mm" => 1e-3,
-        _ => return Err(format!("`{unit}` is not a unit of length: use mm, cm or m, as in 1.2m or 80cm")),
-    };
-    let metres = number * factor;
+    let metres = LENGTH.parse(text)?;
     if metres.abs() <= MAX_M { Ok(metres) } else { Err(format!("the length must be within {MAX_M:e} m")) }
+}
+
+/// Parses an angle such as `2deg`, `0.1rad`, `20mrad` or `2`; returns degrees.
+pub(super) fn degrees(text: &str) -> Result<f64, String> {
+    let degrees = ANGLE.parse(text)?;
+    if degrees.abs() <= MAX_DEG { Ok(degrees) } else { Err(format!("the angle must be within {MAX_DEG:e} degrees")) }
+}
+
+/// Parses an angular rate such as `0.1deg/s`, `5mrad/s` or `0.1`; returns degrees per second.
+pub(super) fn degrees_per_second(text: &str) -> Result<f64, String> {
+    degrees(text.trim().trim_end_matches("/s"))
+}
+
+/// Parses a frequency such as `2Hz`, `500mHz` or `2`; returns hertz.
+pub(super) fn hertz(text: &str) -> Result<f64, String> {
+    let hertz = FREQUENCY.parse(text)?;
+    if hertz > 0.0 && hertz <= MAX_HZ {
+        Ok(hertz)
+    } else {
+        Err(format!("the frequency must be above 0 Hz and at most {MAX_HZ:e} Hz"))
+    }
 }
 
 #[cfg(test)]
@@ -70,5 +116,19 @@ mod tests {
         for text in ["", "m", "nan", "inf", "3 feet", "1e400m", "1e6m"] {
             assert!(metres(text).is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn angles_and_frequencies_have_units_or_none() {
+        for (text, expected) in [("2", 2.0), ("-2deg", -2.0), ("2°", 2.0), ("0.5 rad", 28.648), ("100mrad", 5.7296)] {
+            assert!((degrees(text).unwrap() - expected).abs() < 1e-3, "{text}");
+        }
+        for (text, expected) in [("2", 2.0), ("2Hz", 2.0), ("500 mHz", 0.5), ("1kHz", 1000.0)] {
+            assert_eq!(hertz(text), Ok(expected), "{text}");
+        }
+        for text in ["", "2m", "nan", "-1Hz", "0", "1e400"] {
+            assert!(hertz(text).is_err(), "{text}");
+        }
+        assert!(degrees("2hz").is_err() && degrees("inf").is_err());
     }
 }

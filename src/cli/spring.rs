@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
-use super::{Completion, output, spring_text};
+use super::{Completion, output, quantity, spring_text};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find};
@@ -40,10 +40,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME|FILE", default_value = "3dm_gx2")]
     imu: String,
     /// Amplitude of the hand's nod, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 2.0)]
+    #[arg(long, value_name = "DEG", default_value = "2deg", value_parser = quantity::degrees, allow_hyphen_values = true)]
     pitch: f64,
     /// Frequency of the hand's nod, Hz [default: the head's slowest mode]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = quantity::hertz, allow_hyphen_values = true)]
     frequency: Option<f64>,
     /// Folder for the page (report.html), plots of the modes and of the lidar coverage, and all figures (spring.json)
     #[command(flatten)]

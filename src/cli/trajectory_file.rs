@@ -27,7 +27,7 @@ pub(super) struct TruthTimes {
     #[arg(long, value_name = "TIMES.txt", requires = "truth", conflicts_with = "truth_rate")]
     truth_times: Option<PathBuf>,
     /// Poses per second of a truth in the KITTI format, from 0 s on, instead of --truth-times
-    #[arg(long, value_name = "HZ", requires = "truth")]
+    #[arg(long, value_name = "HZ", requires = "truth", value_parser = super::quantity::hertz, allow_hyphen_values = true)]
     truth_rate: Option<f64>,
 }
 

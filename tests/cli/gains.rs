@@ -128,7 +128,7 @@ fn coverage_needs_no_scene() {
 fn invalid_usage_exits_with_2_and_a_message() {
     for (arguments, sentence) in [
         (&["gains", "--head", "nowhere"][..], "no such head"),
-        (&["gains", "--up-to", "0"][..], "--up-to 0"),
+        (&["gains", "--up-to", "0"][..], "above 0 Hz"),
         (&["gains", "--realisations", "1"][..], "2 or more"),
         (&["spring", "nowhere"][..], "no such head"),
         (&["spring", "design", "nowhere"][..], "no such study"),

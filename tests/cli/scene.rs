@@ -21,10 +21,11 @@ fn the_file_is_replaced_only_with_force_and_its_ending_must_be_known() {
     let here = tempfile::tempdir().unwrap();
     for (command, file) in [("view", "box.html"), ("plan", "box.svg"), ("export", "box.glb"), ("export", "box.STL")] {
         std::fs::write(here.path().join(file), "mine").unwrap();
-        let (code, out, errors) = run(here.path(), &format!("scene {command} mocap_room {file}"));
-        let other = file.replace('.', "-2.");
-        assert_eq!((code, out.lines().last()), (0, Some(other.as_str())), "{errors}");
+        let (code, _, errors) = run(here.path(), &format!("scene {command} mocap_room {file}"));
+        assert!(code == 1 && errors.contains(&format!("{file} exists: pass --force")), "{errors}");
         assert_eq!(std::fs::read(here.path().join(file)).unwrap(), b"mine");
+        let other = file.replace('.', "-other.");
+        assert_eq!(run(here.path(), &format!("scene {command} mocap_room {other}")).0, 0);
         let (code, out, errors) = run(here.path(), &format!("scene {command} mocap_room {file} --force"));
         assert_eq!((code, out.lines().last()), (0, Some(file)), "{errors}");
         let [first, second] = [file, &other].map(|name| std::fs::read(here.path().join(name)).unwrap());

@@ -1,5 +1,6 @@
 //! `zsim spec`: schemas and reference agree with the types and with the shipped specs.
 
+use crate::command::run;
 use crate::command::{exits_with, zsim};
 use crate::recording::readers::python;
 use crate::skip::run_or_skip;
@@ -104,4 +105,61 @@ fn list_and_show_print_the_shipped_specs() {
     assert_eq!(text, std::fs::read_to_string(shipped).unwrap());
     let (_, message) = exits_with(2, zsim().args(["spec", "show", "imu", "no_such_imu"]));
     assert!(message.contains("3dm_gx2"), "{message}");
+}
+
+/// A misspelt key of an IMU was blamed on `SceneSpec`.
+#[test]
+fn a_spec_outside_its_folder_is_judged_as_the_kind_that_has_its_keys() {
+    let here = tempfile::tempdir().unwrap();
+    let imu = include_str!("../../specs/imus/consumer.ron");
+    std::fs::write(here.path().join("mine.ron"), imu.replacen("rate_hz", "rate_hx", 1)).unwrap();
+    std::fs::write(here.path().join("lidar.ron"), include_str!("../../specs/lidars/utm30lx.ron")).unwrap();
+    let error = |arguments: &str| {
+        let (code, _, stderr) = run(here.path(), arguments);
+        assert_eq!(code, 2, "{stderr}");
+        stderr
+    };
+    let misspelt = error("check mine.ron");
+    assert!(misspelt.contains("`rate_hx` in `ImuSpec` (did you mean rate_hz?)"), "{misspelt}");
+    let lidar = error("simulate --scene office --imu lidar.ron --duration 1s --out run.mcap");
+    assert!(lidar.contains("its keys are those of a spec of kind lidar"), "{lidar}");
+}
+
+#[test]
+fn misspelt_names_and_values_out_of_their_domain_are_errors_with_a_remedy() {
+    let here = tempfile::tempdir().unwrap();
+    for (arguments, expected) in [
+        ("check offcie", "no scene or spec of this name"),
+        ("--scene offcie", "did you mean office?"),
+        ("--scene office --head handhold", "did you mean handheld?"),
+        ("--scene office --duration -5s", "the duration must be above 0 s"),
+        ("spring handheld --pitch 2parsecs", "`parsecs` is not a unit of angle"),
+        ("gains --up-to -3Hz", "the frequency must be above 0 Hz"),
+    ] {
+        let (code, _, stderr) = run(here.path(), arguments);
+        assert!(code == 2 && stderr.contains(expected), "{arguments}: {stderr}");
+    }
+    let compare = "compare --truth t.tum e.tum --fail-above position_rsme=5mm";
+    let (code, _, stderr) = run(here.path(), compare);
+    assert!(code == 2 && stderr.contains("did you mean position_rmse?"), "{stderr}");
+    assert_eq!(run(here.path(), "simulate --scene mocap_room --duration 1s --quiet --out run.mcap").0, 0);
+    let (code, _, stderr) = run(here.path(), "estimate run.mcap --lidar-topic /scna");
+    assert!(code == 1 && stderr.contains("did you mean /scan?"), "{code}: {stderr}");
+    let of = |pitch: &str| {
+        let (code, out, stderr) = run(here.path(), &format!("spring handheld --pitch {pitch}"));
+        assert_eq!(code, 0, "{stderr}");
+        out
+    };
+    assert_eq!(of("3deg"), of("3"));
+    assert_eq!(of("3deg"), of("0.05235987755982988rad"));
+}
+
+#[test]
+fn a_study_of_journeys_needs_the_scene_and_what_it_varies_only() {
+    let here = tempfile::tempdir().unwrap();
+    let study = "(base: journey(scene: \"office\"), axes: [values(path: \"imu\", values: [\"consumer\"])],\n\
+                 sampling: grid, seeds: [1], measures: [position_rmse_m])";
+    std::fs::write(here.path().join("study.ron"), study).unwrap();
+    let (code, out, stderr) = run(here.path(), "check study.ron");
+    assert!(code == 0 && out.contains("study, OK"), "{out}{stderr}");
 }

@@ -1,6 +1,9 @@
 use super::{Position, Source};
 use std::fmt;
 
+/// Start of the message about a key that a type does not have.
+pub(super) const UNKNOWN_KEY: &str = "Unexpected field named ";
+
 /// An error in a spec: file, position, message, and remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
@@ -52,6 +55,11 @@ impl SpecError {
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
+    }
+
+    /// Whether the error is a key that the type does not have.
+    pub(super) fn is_unknown_key(&self) -> bool {
+        self.message.starts_with(UNKNOWN_KEY)
     }
 
     /// Line and column, from 1, if known.

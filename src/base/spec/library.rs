@@ -1,7 +1,9 @@
 //! Search for specs: as a path, in `scenes/` and `specs/` of the working directory, in the binary.
 
-use super::{Source, SpecError};
+use super::{Source, SpecError, Tree};
+use crate::similar::did_you_mean;
 use include_dir::Dir;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use zsim_scenes::SCENES;
 use zsim_specs::SPECS;
@@ -121,7 +123,7 @@ impl Kind {
 pub fn find(kind: Kind, name: &str) -> Result<Source, SpecError> {
     found(kind, name)?.ok_or_else(|| {
         let message = format!("no such {}: not a file, not in {}/, not built in", kind.noun(), kind.folder());
-        SpecError::plain(name, message).with_help(help(kind))
+        SpecError::plain(name, message).with_help(help(kind, name))
     })
 }
 
@@ -136,7 +138,7 @@ pub fn find_from(kind: Kind, referring: &Source, name: &str) -> Result<Source, S
             Some(folder) => format!("{folder}/, "),
         });
         let message = format!("no such {}: \"{name}\" is not in {folder}{}/, not built in", kind.noun(), kind.folder());
-        SpecError::about(referring, name, message).with_help(help(kind))
+        SpecError::about(referring, name, message).with_help(help(kind, name))
     })
 }
 
@@ -170,8 +172,38 @@ fn file_of(name: &str) -> String {
     if name.ends_with(".ron") { name.to_owned() } else { format!("{name}.ron") }
 }
 
-fn help(kind: Kind) -> String {
-    format!("built in are: {}", names(kind).join(", "))
+fn help(kind: Kind, name: &str) -> String {
+    let names = names(kind);
+    let question = did_you_mean(name.trim_end_matches(".ron"), names.iter().map(String::as_str));
+    let question = question.map_or_else(String::new, |question| question + " ");
+    format!("{question}built in are: {}", names.join(", "))
+}
+
+/// Returns the kind of a spec whose top-level keys are those of `source`: most of them, the first kind of several.
+///
+/// The keys of a kind are those of its built-in specs.
+pub fn kind_by_keys(source: &Source) -> Option<KindByKeys> {
+    let tree = Tree::read(source).ok()?;
+    let keys = tree.keys();
+    let known = |kind: Kind| {
+        let texts = folder_in_binary(kind).into_iter().flat_map(Dir::files).filter_map(|file| file.contents_utf8());
+        let of_each = texts.filter_map(|text| Tree::read(&Source::in_memory("", text)).ok());
+        let known: BTreeSet<String> = of_each.flat_map(|tree| tree.keys()).collect();
+        keys.iter().filter(|key| known.contains(*key)).count()
+    };
+    let matching = Kind::ALL.into_iter().map(|kind| (kind, known(kind)));
+    // The first of equal ones: `max_by_key` returns the last.
+    let (kind, count) = matching.rev().max_by_key(|(_, count)| *count)?;
+    (count > 0).then_some(KindByKeys { kind, has_all: count == keys.len() })
+}
+
+/// A kind of spec, guessed from keys.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KindByKeys {
+    /// The kind that has the most of the keys.
+    pub kind: Kind,
+    /// Whether it has all of them.
+    pub has_all: bool,
 }
 
 fn built_in(kind: Kind, file: &str) -> Option<Source> {

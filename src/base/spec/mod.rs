@@ -16,7 +16,7 @@ mod unit;
 mod writer;
 
 pub use error::SpecError;
-pub use library::{Kind, MAX_SPEC_BYTES, find, find_from, name_from, names, text_file};
+pub use library::{Kind, KindByKeys, MAX_SPEC_BYTES, find, find_from, kind_by_keys, name_from, names, text_file};
 pub use named::{Named, NamedSpec};
 pub use position::Position;
 pub use source::Source;
@@ -31,7 +31,13 @@ use serde::de::DeserializeOwned;
 /// # Errors
 /// A [`SpecError`] with line and column for invalid syntax, unknown or missing keys, and numbers out of range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
-    Tree::read(source)?.to()
+    Tree::read(source)?.to().map_err(|error: SpecError| match kind_by_keys(source) {
+        // Of a spec of the right kind one key at least is wrong, or a value.
+        Some(KindByKeys { kind, has_all: true }) if error.is_unknown_key() => {
+            error.with_help(format!("its keys are those of a spec of kind {}", kind.noun()))
+        }
+        _ => error,
+    })
 }
 
 /// Finds and parses the spec of `kind` called `name`: a path, or a name in the library.

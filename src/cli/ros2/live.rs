@@ -48,10 +48,10 @@ pub(crate) struct LiveCommand {
         allow_hyphen_values = true)]
     start: Pose,
     /// End after this time [default: with Ctrl-C]
-    #[arg(long, value_name = "TIME", value_parser = quantity::seconds)]
+    #[arg(long, value_name = "TIME", value_parser = quantity::seconds, allow_hyphen_values = true)]
     duration: Option<f64>,
     /// End when no measurement has arrived for this time [default: never]
-    #[arg(long, value_name = "TIME", value_parser = quantity::seconds)]
+    #[arg(long, value_name = "TIME", value_parser = quantity::seconds, allow_hyphen_values = true)]
     idle: Option<f64>,
     /// Record the topics as recording.mcap, and the trajectory as open_loop.tum [default: neither]
     #[command(flatten)]

@@ -11,6 +11,7 @@ use crate::topics::TRUTH_PREFIX;
 use crate::wire::{DecodeError, Decoder};
 use crate::{Reader, RecordingError};
 use std::collections::BTreeMap;
+use zsim_base::similar::did_you_mean;
 
 /// Message encoding of a lidar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,6 +111,8 @@ impl Reader {
 
     fn topic_error(&self, topic: &str, problem: String) -> RecordingError {
         let (name, has) = (self.name().to_owned(), self.topic_list());
+        let question = did_you_mean(topic, self.channels().iter().map(|channel| channel.topic.as_str()));
+        let problem = question.map_or_else(|| problem.clone(), |question| format!("{problem}: {question}"));
         RecordingError::Topic { name, topic: topic.to_owned(), problem, has }
     }
 }

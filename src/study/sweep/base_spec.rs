@@ -31,14 +31,19 @@ pub enum BaseSpec {
         /// Scene.
         scene: String,
         /// Head and its mount.
+        #[serde(default = "usual::head")]
         head: String,
         /// Motion of the base.
+        #[serde(default = "usual::motion")]
         motion: String,
         /// Lidar.
+        #[serde(default = "usual::lidar")]
         lidar: String,
         /// Inertial measurement unit.
+        #[serde(default = "usual::imu")]
         imu: String,
         /// Clocks of the sensors.
+        #[serde(default = "usual::clock")]
         clock: String,
         /// Faults of the sensors and of data delivery; none by default. An axis over faults requires this key; `"none"`
         /// is a list without faults.
@@ -48,6 +53,7 @@ pub enum BaseSpec {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         base_imu: Option<String>,
         /// Settings of the estimator.
+        #[serde(default = "usual::estimator")]
         estimator: String,
         /// Timing errors that replace the true offset of the clocks, and the evaluation of the map with them; none by
         /// default. An axis over timing requires this key.
@@ -64,9 +70,10 @@ pub enum BaseSpec {
         #[serde(default)]
         route: Option<String>,
         /// Duration of a run, s.
-        #[serde(with = "checked::Positive")]
+        #[serde(default = "usual::duration_s", with = "checked::Positive")]
         duration_s: f64,
-        /// Limits of computing time and memory.
+        /// Limits of computing time and memory; 600 s and 4 GiB by default.
+        #[serde(default)]
         limit: LimitSpec,
     },
 }
@@ -129,4 +136,47 @@ pub struct LimitSpec {
     pub time_s: f64,
     /// Memory limit of the worker process, MiB; enforced only on Linux.
     pub memory_mib: u64,
+}
+
+impl Default for LimitSpec {
+    fn default() -> Self {
+        Self { time_s: 600.0, memory_mib: 4096 }
+    }
+}
+
+/// The values of a journey's keys that are omitted: those of a simulation on the command line.
+mod usual {
+    use zsim_simulation::Scenario;
+
+    fn scenario() -> Scenario {
+        Scenario::in_scene("")
+    }
+
+    pub fn head() -> String {
+        scenario().head
+    }
+
+    pub fn motion() -> String {
+        scenario().motion
+    }
+
+    pub fn lidar() -> String {
+        scenario().lidar
+    }
+
+    pub fn imu() -> String {
+        scenario().imu
+    }
+
+    pub fn clock() -> String {
+        scenario().clock
+    }
+
+    pub fn estimator() -> String {
+        "default".to_owned()
+    }
+
+    pub fn duration_s() -> f64 {
+        scenario().duration_s
+    }
 }

@@ -1,5 +1,7 @@
 //! The error of reading a type from a tree, before its position is known.
 
+use super::super::error::UNKNOWN_KEY;
+use crate::similar::did_you_mean;
 use serde::de::{Error, Expected, Unexpected};
 use std::borrow::Cow;
 use std::fmt;
@@ -32,14 +34,16 @@ impl Failure {
         match &*self.0 {
             Reason::Message(message) => message.clone().into_owned(),
             Reason::UnknownField { found, expected } => {
-                format!("Unexpected field named {}{inside}, {}", quoted(found), one_of(expected, "fields"))
+                let similar = similar(found, expected);
+                format!("{UNKNOWN_KEY}{}{inside}{similar}, {}", quoted(found), one_of(expected, "fields"))
             }
             Reason::UnknownVariant { found, expected } => {
                 let (kind, inside) = match enumeration {
                     "" => ("enum variant", String::new()),
                     name => ("variant", format!(" in enum {}", quoted(name))),
                 };
-                format!("Unexpected {kind} named {}{inside}, {}", quoted(found), one_of(expected, "variants"))
+                let similar = similar(found, expected);
+                format!("Unexpected {kind} named {}{inside}{similar}, {}", quoted(found), one_of(expected, "variants"))
             }
             Reason::MissingField(field) => format!("Unexpected missing field named {}{inside}", quoted(field)),
             Reason::DuplicateField(field) => format!("Unexpected duplicate field named {}{inside}", quoted(field)),
@@ -100,6 +104,11 @@ impl Error for Failure {
     fn duplicate_field(field: &'static str) -> Self {
         Self(Box::new(Reason::DuplicateField(field)))
     }
+}
+
+/// The expected name that `found` probably stands for, in brackets; empty if there is none.
+fn similar(found: &str, expected: &[&str]) -> String {
+    did_you_mean(found, expected.iter().copied()).map_or_else(String::new, |question| format!(" ({question})"))
 }
 
 /// A found value in words.

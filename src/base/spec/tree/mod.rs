@@ -79,6 +79,11 @@ impl Tree {
         self.all().get(path)
     }
 
+    /// Returns the keys of the outermost struct or map, or the name of the outermost variant.
+    pub fn keys(&self) -> Vec<String> {
+        self.root.keys().map(str::to_owned).collect()
+    }
+
     fn all(&self) -> Subtree<'_> {
         Subtree { tree: self, node: &self.root }
     }

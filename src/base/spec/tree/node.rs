@@ -69,6 +69,16 @@ impl Node {
         }
     }
 
+    /// The keys of a struct or map, or the name of a variant.
+    pub fn keys(&self) -> impl Iterator<Item = &str> {
+        let (entries, named): (&[Entry], _) = match &self.kind {
+            Kind::Struct(entries) | Kind::Map(entries) => (entries, None),
+            Kind::Named(named) => (&[], named.0.text()),
+            _ => (&[], self.name()),
+        };
+        entries.iter().filter_map(|(key, _)| key.text()).chain(named)
+    }
+
     /// The name, if the node is a bare name.
     pub fn name(&self) -> Option<&str> {
         match &self.kind {

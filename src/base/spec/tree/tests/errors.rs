@@ -66,7 +66,7 @@ fn a_value_of_another_type_is_an_error_at_the_value() {
         (
             "(modes: slow)",
             2,
-            "Unexpected field named `modes` in `Spec`, expected one of `mode`, `size_m`, or `names` instead",
+            "Unexpected field named `modes` in `Spec` (did you mean mode?), expected one of `mode`, `size_m`, or `names` instead",
         ),
         ("(mode: slow, mode: slow)", 14, "Unexpected duplicate field named `mode` in `Spec`"),
         ("(size_m: (1, 2),\n)", 1, "Unexpected missing field named `mode` in `Spec`"),
