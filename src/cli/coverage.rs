@@ -94,7 +94,7 @@ fn text(seen: &Coverage) -> String {
         ("beams per sr and s: mean, 10th percentile", {
             format!("{:.0}, {:.0}", seen.density_per_sr_s.mean, seen.density_per_sr_s.p10)
         }),
-        ("elevation of the forward beam, deg", format!("{:.1} (95 % of the time)", seen.field_of_view_deg)),
+        ("vertical field of view, deg", format!("{:.1} (95 % of the elevations)", seen.field_of_view_deg)),
         ("maximum tilt of the scan plane, deg", format!("{:.1}", seen.most_tilt_deg)),
         ("maximum rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
         ("99th percentile of the rate, deg/s", format!("{:.0}", gyro.p99_deg_per_s)),

@@ -191,8 +191,9 @@ impl Coil {
     pub fn under_load(&self, load_n: f64) -> Result<Column, ElasticityError> {
         let length_m = self.free_length_m - load_n / self.axial_n_per_m();
         if length_m <= self.solid_length_m() {
-            let (loaded_mm, solid_mm) = (length_m * 1e3, self.solid_length_m() * 1e3);
-            return Err(ElasticityError::Clash { load_n, loaded_mm, solid_mm });
+            let shorter_mm = |length_m: f64| (self.free_length_m - length_m) * 1e3;
+            let (by_mm, travel_mm) = (shorter_mm(length_m), shorter_mm(self.solid_length_m()));
+            return Err(ElasticityError::Clash { load_n, by_mm, travel_mm });
         }
         let poisson = self.moduli.poisson();
         Ok(Column {
@@ -242,10 +243,10 @@ mod tests {
         assert!(matches!(error, ElasticityError::CoilsTouch { .. }), "{error}");
         // k = 79.3e9 * 0.003^4 / (8 * 0.025^3 * 12) = 4282.2 N/m; 400 N would leave 26.6 mm; the solid length is 36 mm.
         let coil = Coil::new(0.025, 0.003, 12.0, 0.12, STEEL).unwrap();
-        let ElasticityError::Clash { loaded_mm, solid_mm, .. } = coil.under_load(400.0).unwrap_err() else {
+        let ElasticityError::Clash { by_mm, travel_mm, .. } = coil.under_load(400.0).unwrap_err() else {
             panic!("no clash");
         };
-        assert!((loaded_mm - 26.59).abs() < 0.01 && (solid_mm - 36.0).abs() < 1e-9, "{loaded_mm} {solid_mm}");
+        assert!((by_mm - 93.41).abs() < 0.01 && (travel_mm - 84.0).abs() < 1e-9, "{by_mm} {travel_mm}");
     }
 
     #[test]

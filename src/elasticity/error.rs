@@ -56,15 +56,16 @@ pub enum ElasticityError {
     },
     /// The load compresses the spring to the solid length.
     #[error(
-        "a load of {load_n:.2} N compresses the spring to {loaded_mm:.2} mm, but the coils touch at {solid_mm:.2} mm"
+        "a load of {load_n:.2} N shortens the spring by {by_mm:.1} mm, but its coils touch after {travel_mm:.1} mm: use a stiffer \
+         or longer spring"
     )]
     Clash {
         /// Axial load, N.
         load_n: f64,
-        /// Length under the load without contact of the coils, mm.
-        loaded_mm: f64,
-        /// Solid length, at which the coils touch, mm.
-        solid_mm: f64,
+        /// By how much the load would shorten the spring without contact of the coils, mm.
+        by_mm: f64,
+        /// By how much it can be shortened until the coils touch, mm.
+        travel_mm: f64,
     },
     /// The moduli are impossible for an isotropic solid.
     #[error(

@@ -43,10 +43,10 @@ impl RecordedManifest {
         let imu = run.and_then(|run| sensor(run.get(&["imu"])?));
         let lidar = run.and_then(|run| sensor(run.get(&["lidar"])?));
         let read = match (&imu, &lidar) {
-            (Some(_), Some(_)) => "the models of IMU and lidar are from it",
-            (Some(_), None) => "the model of the IMU is from it, that of the lidar is not",
-            (None, Some(_)) => "the model of the lidar is from it, that of the IMU is not",
-            (None, None) => "no sensor models are from it",
+            (Some(_), Some(_)) => "its models of IMU and lidar are used",
+            (Some(_), None) => "its model of the IMU is used, that of the lidar is unknown",
+            (None, Some(_)) => "its model of the lidar is used, that of the IMU is unknown",
+            (None, None) => "the models of the sensors are unknown",
         };
         let writer = version.map(|version| format!(", written by zsim {version},")).unwrap_or_default();
         let line = error.line_and_column().map(|(line, _)| format!("line {line}: ")).unwrap_or_default();

@@ -95,7 +95,8 @@ fn estimated_with(section: &str, key: &str, by: &str) -> (Value, String) {
 #[test]
 fn of_a_manifest_with_a_renamed_key_the_other_sensor_is_read() {
     let (metrics, stderr) = estimated_with("lidar: (", "near_sigma_m:", "sigma_near_m:");
-    for part in ["written by zsim 0.0.9", "sigma_near_m", "the model of the IMU is from it, that of the lidar is not"] {
+    for part in ["written by zsim 0.0.9", "sigma_near_m", "its model of the IMU is used, that of the lidar is unknown"]
+    {
         assert!(stderr.contains(part), "{part}: {stderr}");
     }
     assert!(
@@ -111,7 +112,7 @@ fn of_a_manifest_with_a_renamed_key_the_other_sensor_is_read() {
 #[test]
 fn of_a_manifest_without_a_key_of_the_imu_the_lidar_is_read() {
     let (metrics, stderr) = estimated_with("imu: (", "rate_hz: 100.0,", "");
-    assert!(stderr.contains("the model of the lidar is from it, that of the IMU is not"), "{stderr}");
+    assert!(stderr.contains("its model of the lidar is used, that of the IMU is unknown"), "{stderr}");
     assert!(stderr.contains("missing field named `rate_hz`"), "{stderr}");
     assert_eq!(noise(&metrics, "imu.gyro_limit_rad_per_s"), (2000_f64.to_radians(), "assumed"));
     assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
@@ -135,7 +136,7 @@ fn of_a_manifest_in_the_form_before_0_1_0_both_sensors_are_read() {
 #[test]
 fn of_a_manifest_with_a_renamed_key_of_the_scene_both_sensors_are_read() {
     let (metrics, stderr) = estimated_with("scene: (", "materials:", "surfaces:");
-    assert!(stderr.contains("the models of IMU and lidar are from it, and the cloud is not evaluated"), "{stderr}");
+    assert!(stderr.contains("its models of IMU and lidar are used, and the cloud is not evaluated"), "{stderr}");
     assert!(stderr.contains("note: noise: from the recording's manifest\n"), "{stderr}");
     assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
     assert!(metrics["cloud"]["sigma_m"].is_null());
