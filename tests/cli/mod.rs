@@ -3,6 +3,7 @@
 mod benchmark;
 mod commands;
 mod compare;
+mod document_blocks;
 mod documents;
 mod examples;
 mod gains;
