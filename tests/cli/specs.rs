@@ -155,11 +155,23 @@ fn misspelt_names_and_values_out_of_their_domain_are_errors_with_a_remedy() {
 }
 
 #[test]
-fn a_study_of_journeys_needs_the_scene_and_what_it_varies_only() {
+fn a_study_may_have_a_name_and_needs_of_a_journey_the_scene_only() {
     let here = tempfile::tempdir().unwrap();
     let study = "(base: journey(scene: \"office\"), axes: [values(path: \"imu\", values: [\"consumer\"])],\n\
                  sampling: grid, seeds: [1], measures: [position_rmse_m])";
     std::fs::write(here.path().join("study.ron"), study).unwrap();
     let (code, out, stderr) = run(here.path(), "check study.ron");
     assert!(code == 0 && out.contains("study, OK"), "{out}{stderr}");
+    let named = |name: &str| {
+        let spring = "base: spring(head: \"handheld\", shake: (pitch_deg: 2.0)), measures: [rocking_hz], sampling: grid,\n\
+                      axes: [linear(path: \"head.wire_diameter_mm\", from: 2.9, to: 3.1, steps: 2)]";
+        std::fs::write(here.path().join("named.ron"), format!("(name: \"{name}\",\n{spring})")).unwrap();
+        run(here.path(), "study named.ron")
+    };
+    let (code, out, stderr) = named("my springs");
+    assert!(code == 0 && out.ends_with("results/my springs\n"), "{out}{stderr}");
+    for hostile in ["../up", "a/b", "", ".", "a\u{7}"] {
+        let (code, _, stderr) = named(hostile);
+        assert!(code == 2 && stderr.contains("must be the name of a folder"), "{hostile:?}: {stderr}");
+    }
 }

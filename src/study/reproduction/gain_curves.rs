@@ -73,6 +73,7 @@ fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent) -> Result<Pl
     let letters = heads.iter().map(|head| Setting::Text(head.name.clone())).collect();
     let axes = AXES.iter().map(|axis| Setting::Text(format!("{axis:?}"))).collect();
     let sweep = SweepSpec {
+        name: None,
         base: BaseSpec::Gains { head: spec.designs[0].letter.clone(), gains },
         axes: vec![axis("head", letters), axis("gains.axis", axes)],
         sampling: Sampling::Grid,

@@ -74,6 +74,12 @@ impl Plan {
         source: &Source,
     ) -> Result<Self, StudyError> {
         check(spec, source)?;
+        let name = spec.name.as_deref().unwrap_or(name);
+        if let Some(own) = spec.name.as_deref().filter(|own| !is_folder_name(own)) {
+            let message =
+                format!("name {own:?} must be the name of a folder: letters, digits, spaces, -, _ and dots inside");
+            return Err(SpecError::about(source, "name", message).into());
+        }
         if name.chars().any(char::is_control) {
             let message = format!("the sweep's name {name:?} has control characters: rename its file");
             return Err(SpecError::plain(&source.name, message).into());
@@ -209,4 +215,11 @@ impl Plan {
         parts.for_each(|part| all.push(part));
         ContentHash::of(all)
     }
+}
+
+/// Whether a folder for results can have this name on all systems.
+fn is_folder_name(name: &str) -> bool {
+    let is_usual = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.');
+    let is_end = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
+    name.chars().all(is_usual) && is_end(name.chars().next()) && is_end(name.chars().next_back())
 }

@@ -9,6 +9,9 @@ use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepSpec {
+    /// Name in titles and of the default folder for results; that of the file by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The base run.
     pub base: BaseSpec,
     /// Axes: the parameters to vary. In a grid the other levels of an axis are compared with its first level.
