@@ -112,7 +112,10 @@ impl Reader {
     fn topic_error(&self, topic: &str, problem: String) -> RecordingError {
         let (name, has) = (self.name().to_owned(), self.topic_list());
         let question = did_you_mean(topic, self.channels().iter().map(|channel| channel.topic.as_str()));
-        let problem = question.map_or_else(|| problem.clone(), |question| format!("{problem}: {question}"));
+        let problem = match question {
+            Some(question) => format!("{problem}: {question}"),
+            None => problem,
+        };
         RecordingError::Topic { name, topic: topic.to_owned(), problem, has }
     }
 }
