@@ -81,6 +81,6 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         "share_on_first": fraction,
         "residual_rms_m": residual_m,
     });
-    output::print_result(global, &zsim_report::table(&[], &rows, true), figures, Some(&out))?;
+    output::print_result(global, &zsim_report::table(&[], &rows, true), figures, Some(out))?;
     Ok(Completion::Done)
 }
