@@ -7,7 +7,7 @@
 //! contradiction would hold `b` and `M` back. So the states take the rest with each step, and the inertial residuals depend on
 //! `b` and `M` only by the part that the spline follows.
 
-use super::inertial::Nodes;
+use super::nodes::Nodes;
 use super::{ACCEL_BIAS, ACCEL_MATRIX, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::nominal::Correction;
 use crate::normal_equations::{Factor, NormalEquations};

@@ -24,10 +24,10 @@
 use super::Layout;
 use super::fast_motion::FastMotion;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial};
+use super::nodes::Nodes;
 use super::rows::ResidualSums;
 use crate::normal_equations::NormalEquations;
-use crate::spline::Basis;
-use crate::strapdown::{Biases, Interval, State};
+use crate::strapdown::{Biases, Interval};
 use zsim_base::geometry::Vector;
 
 /// Factor on the sigma of a single accelerometer sample, because the correction cannot follow it within a knot span.
@@ -45,15 +45,6 @@ const STEP: (f64, f64) = (0.03, 0.08);
 const STEP_MARGIN_S: f64 = 0.3;
 /// Sigmas added to the samples within this time, rad/s and m/s^2.
 const STEP_MARGIN_SIGMA: (f64, f64) = (0.5, 3.0);
-
-/// The nodes of the trajectory that a window corrects, and the IMU intervals between them.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Nodes<'a> {
-    pub(crate) states: &'a [State],
-    /// The spline basis at each state.
-    pub(crate) bases: &'a [Basis],
-    pub(crate) intervals: &'a [Interval],
-}
 
 /// Adds the residuals of the intervals between `nodes` to the equations.
 ///
@@ -140,7 +131,9 @@ mod tests {
     use crate::normal_equations::Factor;
     use crate::residual::prior::Start;
     use crate::residual::{ACCEL_BIAS, ACCEL_MATRIX, BORDER, GRAVITY, GYRO_BIAS, GYRO_MATRIX};
+    use crate::spline::Basis;
     use crate::strapdown::ImuScaleMisalignment;
+    use crate::strapdown::State;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector, SVector};
     use std::f64::consts::TAU;

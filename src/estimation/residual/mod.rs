@@ -7,6 +7,7 @@ pub(super) mod inertial;
 mod knot_span;
 mod layout;
 pub(super) mod matched;
+mod nodes;
 pub(super) mod paper;
 pub(super) mod prior;
 mod rows;
@@ -16,6 +17,7 @@ pub(super) use fast_motion::FastMotion;
 pub(super) use layout::{
     ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, Layout,
 };
+pub(super) use nodes::Nodes;
 
 pub(super) const CLOCK_RATE: usize = 9;
 pub(super) const RANGE: usize = 10;

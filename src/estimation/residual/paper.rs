@@ -26,7 +26,8 @@
 
 use super::Layout;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial, ResidualSum, offset, span_of};
-use super::inertial::{Nodes, near_steps, with_step_margin};
+use super::inertial::{near_steps, with_step_margin};
+use super::nodes::Nodes;
 use super::rows::{KNOTS, ResidualSums};
 use crate::normal_equations::NormalEquations;
 use crate::spline::Basis;
