@@ -90,7 +90,7 @@ class Killer:
 
 
 def kill_simulate(killer):
-    """Checks that a killed recording can be read, and that the next one gets another name."""
+    """Checks that a killed recording can be read, and that the next one does not replace it."""
     was_killed = killer.run_and_kill([*SIMULATE, "--duration", "60s", "--out", "run.mcap"], 3.0, "simulate")
     for path in killer.files("run*.mcap"):
         if path.stat().st_size == 0:
@@ -100,11 +100,15 @@ def kill_simulate(killer):
         require(info.returncode in (0, 3) or is_only_started, f"info of {path.name}: {info.returncode} {info.stderr}")
         require("panicked" not in info.stderr, info.stderr)
     before = {path.name: path.read_bytes() for path in killer.files("run*")}
-    out = killer.run_ok(*SIMULATE, "--duration", "1s", "--out", "run.mcap").splitlines()[-1]
-    require(out not in before, f"{out} was replaced")
+    again = killer.run(*SIMULATE, "--duration", "1s", "--out", "run.mcap")
+    if before:
+        require(again.returncode == 1 and "exists" in again.stderr, f"{again.returncode} {again.stderr}")
+    else:
+        require(again.returncode == 0, f"{again.returncode} {again.stderr}")
     for name, content in before.items():
         require((killer.folder / name).read_bytes() == content, f"{name} was changed")
-    require(killer.run("info", out).returncode == 0, f"{out} cannot be read")
+    killer.run_ok(*SIMULATE, "--duration", "1s", "--out", "run-other.mcap")
+    require(killer.run("info", "run-other.mcap").returncode == 0, "run-other.mcap cannot be read")
     for path in killer.files("run*"):
         path.unlink()
     return was_killed
