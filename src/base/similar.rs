@@ -2,10 +2,10 @@
 
 /// Returns the candidate that differs from `name` by the fewest letters inserted, left out, replaced or exchanged with the
 /// next one (optimal string alignment); `None` if more than a third of the letters differ.
-pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let distances = candidates.into_iter().map(|candidate| (strsim::osa_distance(name, candidate), candidate));
     let (distance, nearest) = distances.min_by_key(|(distance, _)| *distance)?;
-    (distance > 0 && distance <= (name.chars().count() / 3).max(1)).then_some(nearest)
+    (distance > 0 && 3 * distance <= name.chars().count()).then_some(nearest)
 }
 
 /// Returns `did you mean NAME?` for the candidate that `name` probably stands for.
@@ -28,6 +28,7 @@ mod tests {
             ("gyro", None),
             ("lidar", None),
             ("x", None),
+            ("hz", None),
             ("", None),
         ] {
             assert_eq!(nearest(name, names), expected, "{name}");

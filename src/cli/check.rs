@@ -6,7 +6,8 @@ use clap::Args;
 use serde_json::json;
 use std::path::Path;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, Tree, find, kind_by_keys};
+use zsim_base::similar::did_you_mean;
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, Tree, find, kind_by_keys, names};
 use zsim_dynamics::{HeadModel, HeadSpec};
 use zsim_elasticity::{ElasticityError, SpringSpec};
 use zsim_estimation::{EstimationError, EstimatorSpec};
@@ -93,7 +94,10 @@ fn check(file: &str) -> Result<Checked, SpecError> {
         false => {
             let found = KINDS.iter().find_map(|kind| Some((*kind, find(*kind, file).ok()?)));
             let Some((kind, source)) = found else {
-                return Err(SpecError::plain(file, "no such file, and no scene or spec of this name"));
+                let error = SpecError::plain(file, "no such file, and no scene or spec of this name");
+                let known: Vec<String> = KINDS.into_iter().flat_map(names).collect();
+                let question = did_you_mean(file, known.iter().map(String::as_str));
+                return Err(question.map_or(error.clone(), |question| error.with_help(question)));
             };
             return build(kind, &source).map(|warnings| (kind, warnings));
         }
@@ -106,10 +110,8 @@ fn kind_by_trying(source: &Source) -> Result<Checked, SpecError> {
     if let Some(kind) = KINDS.into_iter().find(|kind| parse_as(*kind, source).is_ok()) {
         return build(kind, source).map(|warnings| (kind, warnings));
     }
-    let error = match kind_by_keys(source) {
-        Some(found) => parse_as(found.kind, source).err(),
-        None => Tree::read(source).err(),
-    };
+    let found = kind_by_keys(&Tree::read(source)?.keys());
+    let error = found.and_then(|found| parse_as(found.kind, source).err());
     Err(error.unwrap_or_else(|| SpecError::plain(source.name.clone(), "is neither a scene nor a spec")))
 }
 

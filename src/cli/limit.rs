@@ -1,5 +1,6 @@
 //! Limits of the errors of a trajectory, `position_rmse=5mm`.
 
+use super::quantity::number_and_unit;
 use serde_json::{Map, Value};
 use zsim_base::similar::did_you_mean;
 
@@ -77,14 +78,13 @@ impl Limit {
             return Err(format!("`{name}` is not a figure with a limit:{question} use one of {}", names.join(", ")));
         };
         let value = value.trim();
-        let unit_at = value.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E').unwrap_or(value.len());
-        let (number, unit) = value.split_at(unit_at);
+        let (number, unit) = number_and_unit(value);
         let mut units = dimensions.iter().flat_map(|dimension| dimension.units().iter().map(move |u| (dimension, u)));
         let Some((dimension, (_, factor))) = units.clone().find(|(_, (symbol, _))| *symbol == unit) else {
             let symbols: Vec<&str> = units.by_ref().map(|(_, (symbol, _))| *symbol).collect();
             return Err(format!("the limit of {name} needs one of the units {}", symbols.join(", ")));
         };
-        let number: f64 = number.trim().parse().map_err(|_| format!("`{value}` is not a number and a unit"))?;
+        let number = number.ok_or_else(|| format!("`{value}` is not a number and a unit"))?;
         if !(number.is_finite() && number >= 0.0) {
             return Err(format!("the limit of {name} must be at least 0"));
         }

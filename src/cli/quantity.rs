@@ -43,18 +43,23 @@ const FREQUENCY: Quantity = Quantity {
 impl Quantity {
     /// Returns the value of a number and a unit; without unit, the first unit applies.
     fn parse(&self, text: &str) -> Result<f64, String> {
-        let text = text.trim();
-        let is_unit = |c: char| (c.is_alphabetic() && c != 'e' && c != 'E') || c == '°';
-        let (number, unit) = text.split_at(text.find(is_unit).unwrap_or(text.len()));
         let Self { noun, example, units } = self;
-        let number = number.trim().parse::<f64>();
-        let number =
-            number.map_err(|_| format!("`{text}` is not {noun}: write a number and a unit, as in {example}"))?;
-        let factor = units.iter().find(|(known, _)| *known == unit.trim()).map(|(_, factor)| *factor);
+        let (number, unit) = number_and_unit(text);
+        let number = number
+            .ok_or_else(|| format!("`{}` is not {noun}: write a number and a unit, as in {example}", text.trim()))?;
+        let factor = units.iter().find(|(known, _)| *known == unit).map(|(_, factor)| *factor);
         let of = noun.trim_start_matches("a ").trim_start_matches("an ");
         let factor = factor.ok_or_else(|| format!("`{unit}` is not a unit of {of}: write for example {example}"))?;
         Ok(number * factor)
     }
+}
+
+/// Splits a text such as `1.5 mm` into its number, if it is one, and its unit.
+pub(super) fn number_and_unit(text: &str) -> (Option<f64>, &str) {
+    let is_unit = |c: char| (c.is_alphabetic() && c != 'e' && c != 'E') || c == '°';
+    let text = text.trim();
+    let (number, unit) = text.split_at(text.find(is_unit).unwrap_or(text.len()));
+    (number.trim().parse().ok(), unit.trim())
 }
 
 /// Parses a duration such as `120s`, `2min`, `1.5h`, `250ms` or `90`; returns seconds.

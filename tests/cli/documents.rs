@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// All Markdown files in `folder`, relative to the repository.
-fn markdown(folder: &str) -> BTreeSet<PathBuf> {
+pub fn markdown(folder: &str) -> BTreeSet<PathBuf> {
     let mut files = BTreeSet::new();
     let mut folders = vec![root().join(folder)];
     while let Some(folder) = folders.pop() {

@@ -123,13 +123,17 @@ fn a_spec_outside_its_folder_is_judged_as_the_kind_that_has_its_keys() {
     assert!(misspelt.contains("`rate_hx` in `ImuSpec` (did you mean rate_hz?)"), "{misspelt}");
     let lidar = error("simulate --scene office --imu lidar.ron --duration 1s --out run.mcap");
     assert!(lidar.contains("its keys are those of a spec of kind lidar"), "{lidar}");
+    // A misspelt nested key says nothing about the kind.
+    std::fs::write(here.path().join("nested.ron"), imu.replacen("scale_percent", "scale_percnt", 1)).unwrap();
+    let nested = error("check nested.ron");
+    assert!(nested.contains("(did you mean scale_percent?)") && !nested.contains("of kind"), "{nested}");
 }
 
 #[test]
 fn misspelt_names_and_values_out_of_their_domain_are_errors_with_a_remedy() {
     let here = tempfile::tempdir().unwrap();
     for (arguments, expected) in [
-        ("check offcie", "no scene or spec of this name"),
+        ("check offcie", "did you mean office?"),
         ("--scene offcie", "did you mean office?"),
         ("--scene office --head handhold", "did you mean handheld?"),
         ("--scene office --duration -5s", "the duration must be above 0 s"),

@@ -1,16 +1,15 @@
 use super::{Position, Source};
 use std::fmt;
 
-/// Start of the message about a key that a type does not have.
-pub(super) const UNKNOWN_KEY: &str = "Unexpected field named ";
-
 /// An error in a spec: file, position, message, and remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
     file: String,
     place: Option<Place>,
-    message: String,
-    help: Option<String>,
+    message: Box<str>,
+    help: Option<Box<str>>,
+    /// The key that the type does not have, if this is the error.
+    unknown_key: Option<Box<str>>,
 }
 
 /// A position, and the line of the text that contains it.
@@ -23,14 +22,14 @@ struct Place {
 impl SpecError {
     /// An error about a file as a whole.
     pub fn plain(file: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { file: file.into(), place: None, message: message.into(), help: None }
+        Self { file: file.into(), place: None, message: message.into().into_boxed_str(), help: None, unknown_key: None }
     }
 
     /// An error at a position in the text of a spec.
     pub fn at(source: &Source, position: Position, message: impl Into<String>) -> Self {
         let text = source.text.lines().nth(position.line.saturating_sub(1)).unwrap_or_default().to_owned();
         let place = Place { position, text };
-        Self { file: source.name.clone(), place: Some(place), message: message.into(), help: None }
+        Self { place: Some(place), ..Self::plain(&source.name, message) }
     }
 
     /// An error at the first occurrence of `key` in the text of a spec, for inconsistencies between several fields.
@@ -53,13 +52,18 @@ impl SpecError {
     /// Adds a remedy to the error.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
+        self.help = Some(help.into().into_boxed_str());
         self
     }
 
-    /// Whether the error is a key that the type does not have.
-    pub(super) fn is_unknown_key(&self) -> bool {
-        self.message.starts_with(UNKNOWN_KEY)
+    /// Marks the error as a key that the type does not have.
+    pub(super) fn with_unknown_key(self, key: Option<&str>) -> Self {
+        Self { unknown_key: key.map(Box::from), ..self }
+    }
+
+    /// The key that the type does not have, if this is the error.
+    pub(super) fn unknown_key(&self) -> Option<&str> {
+        self.unknown_key.as_deref()
     }
 
     /// Line and column, from 1, if known.

@@ -179,12 +179,10 @@ fn help(kind: Kind, name: &str) -> String {
     format!("{question}built in are: {}", names.join(", "))
 }
 
-/// Returns the kind of a spec whose top-level keys are those of `source`: most of them, the first kind of several.
+/// Returns the kind of spec that has the most of the outermost `keys` of a text, the first of several.
 ///
 /// The keys of a kind are those of its built-in specs.
-pub fn kind_by_keys(source: &Source) -> Option<KindByKeys> {
-    let tree = Tree::read(source).ok()?;
-    let keys = tree.keys();
+pub fn kind_by_keys(keys: &[String]) -> Option<KindByKeys> {
     let known = |kind: Kind| {
         let texts = folder_in_binary(kind).into_iter().flat_map(Dir::files).filter_map(|file| file.contents_utf8());
         let of_each = texts.filter_map(|text| Tree::read(&Source::in_memory("", text)).ok());

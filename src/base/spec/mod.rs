@@ -31,12 +31,17 @@ use serde::de::DeserializeOwned;
 /// # Errors
 /// A [`SpecError`] with line and column for invalid syntax, unknown or missing keys, and numbers out of range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
-    Tree::read(source)?.to().map_err(|error: SpecError| match kind_by_keys(source) {
-        // Of a spec of the right kind one key at least is wrong, or a value.
-        Some(KindByKeys { kind, has_all: true }) if error.is_unknown_key() => {
-            error.with_help(format!("its keys are those of a spec of kind {}", kind.noun()))
+    let tree = Tree::read(source)?;
+    tree.to().map_err(|error: SpecError| {
+        let keys = tree.keys();
+        // The error of a nested key says nothing about the kind.
+        let is_outermost = error.unknown_key().is_some_and(|key| keys.iter().any(|outermost| outermost == key));
+        match is_outermost.then(|| kind_by_keys(&keys)).flatten() {
+            Some(KindByKeys { kind, has_all: true }) => {
+                error.with_help(format!("its keys are those of a spec of kind {}", kind.noun()))
+            }
+            _ => error,
         }
-        _ => error,
     })
 }
 

@@ -6,39 +6,21 @@ mod compare;
 mod parse;
 mod run;
 
+use super::documents::{markdown, root};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// Lists README.md, the pages of the book and the READMEs of the examples, with their texts.
+/// Reads README.md, the pages of the book and the READMEs of the examples: paths relative to the repository, and texts.
 fn documents() -> Vec<(PathBuf, String)> {
-    let mut files = vec![root().join("README.md")];
-    let mut folders = vec![root().join("docs"), root().join("examples")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "md") {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
+    let mut files = markdown("docs");
+    files.append(&mut markdown("examples"));
+    files.insert(PathBuf::from("README.md"));
     let with_text = |file: PathBuf| {
-        let text = std::fs::read_to_string(&file).unwrap();
+        let text = std::fs::read_to_string(root().join(&file)).unwrap();
         (file, text)
     };
     files.into_iter().map(with_text).collect()
-}
-
-/// Formats the path of a document, relative to the repository.
-fn name(file: &Path) -> String {
-    file.strip_prefix(root()).unwrap_or(file).display().to_string()
 }
 
 /// Runs a document, updates it if asked to, and returns what is wrong and the number of executed blocks.
@@ -47,12 +29,12 @@ fn check(file: &Path, text: &str, with_long: bool) -> (Vec<String>, usize) {
     let mut problems = outcome.problems;
     if std::env::var_os("ZSIM_DOCUMENTS").is_some_and(|value| value == "write") {
         if outcome.text != text {
-            std::fs::write(file, &outcome.text).unwrap();
+            std::fs::write(root().join(file), &outcome.text).unwrap();
         }
     } else {
         problems.extend(outcome.differences);
     }
-    let problems = problems.iter().map(|problem| format!("{}, {problem}", name(file)));
+    let problems = problems.iter().map(|problem| format!("{}, {problem}", file.display()));
     (problems.collect(), outcome.executed)
 }
 
@@ -109,7 +91,7 @@ fn each_block_is_executed_or_has_a_reason() {
         for block in parse::blocks(&text) {
             match class(&block) {
                 Ok(class) => *counts.entry(class).or_default() += 1,
-                Err(problem) => problems.push(format!("{}, line {}: {problem}", name(&file), block.body.start)),
+                Err(problem) => problems.push(format!("{}, line {}: {problem}", file.display(), block.body.start)),
             }
         }
     }

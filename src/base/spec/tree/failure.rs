@@ -1,6 +1,5 @@
 //! The error of reading a type from a tree, before its position is known.
 
-use super::super::error::UNKNOWN_KEY;
 use crate::similar::did_you_mean;
 use serde::de::{Error, Expected, Unexpected};
 use std::borrow::Cow;
@@ -28,6 +27,14 @@ impl Failure {
         Self(Box::new(Reason::Message(message.into())))
     }
 
+    /// The key that the type does not have, if this is the failure.
+    pub fn unknown_key(&self) -> Option<&str> {
+        match &*self.0 {
+            Reason::UnknownField { found, .. } => Some(found),
+            _ => None,
+        }
+    }
+
     /// The message; `owner` is the struct and `enumeration` the enum that was read, or empty.
     pub fn message(&self, owner: &str, enumeration: &str) -> String {
         let inside = if owner.is_empty() { String::new() } else { format!(" in {}", quoted(owner)) };
@@ -35,7 +42,7 @@ impl Failure {
             Reason::Message(message) => message.clone().into_owned(),
             Reason::UnknownField { found, expected } => {
                 let similar = similar(found, expected);
-                format!("{UNKNOWN_KEY}{}{inside}{similar}, {}", quoted(found), one_of(expected, "fields"))
+                format!("Unexpected field named {}{inside}{similar}, {}", quoted(found), one_of(expected, "fields"))
             }
             Reason::UnknownVariant { found, expected } => {
                 let (kind, inside) = match enumeration {

@@ -62,10 +62,11 @@ impl<'de> Reader<'de> {
     pub fn error(&self, failure: &Failure) -> SpecError {
         let message = failure.message(self.owner.get(), self.enumeration.get());
         let source = self.source;
-        match self.at.get() {
+        let error = match self.at.get() {
             FROM_JSON => SpecError::plain(&source.name, message),
             at => SpecError::at(source, Position::of_offset(&source.text, at as usize), message),
-        }
+        };
+        error.with_unknown_key(failure.unknown_key())
     }
 
     /// The value in brackets that contain no other; JSON has no such brackets.
