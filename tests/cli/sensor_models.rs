@@ -166,4 +166,9 @@ fn an_imu_is_judged_by_the_scale_error_of_its_model() {
     std::fs::write(here.path().join("precise.ron"), precise).unwrap();
     let (code, .., causes) = estimate("--calibration precise.ron");
     assert!(code == 3 && causes.contains("imu_scale"), "{code}: {causes}");
+    for scale in ["-0.01", "NaN", "inf", "50"] {
+        std::fs::write(here.path().join("wrong.ron"), format!("(imu: (gyro_scale_error: {scale}))")).unwrap();
+        let (code, _, stderr) = run(here.path(), "estimate run.mcap --calibration wrong.ron --out wrong");
+        assert!(code != 0 && code != 3 && stderr.contains("scale error of the gyroscope"), "{scale}: {code} {stderr}");
+    }
 }

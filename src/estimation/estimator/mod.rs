@@ -25,6 +25,9 @@ use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::surfel_map::SurfelMap;
 use zsim_base::time::Stamp;
 
+/// Largest standard deviation of scale errors and misalignments of an IMU: their equations are linear.
+const MAX_MATRIX_SIGMA: f64 = 0.2;
+
 /// The open-loop estimator: measurements in, poses out, memory bounded by the window and the fixed views.
 ///
 /// Latency: [`Estimator::take_poses`] returns a pose when it is final, `window_s` plus `step_s` after the time of the
@@ -213,16 +216,26 @@ impl Estimator {
     }
 }
 
-/// Checks the noise densities of the calibration.
+/// Checks the noise of the calibration, and the scale errors and misalignments of the IMU.
 fn check(calibration: &Calibration) -> Result<(), EstimationError> {
     let imu = &calibration.imu;
-    let numbers = [
+    let densities = [
         ("gyroscope noise density", imu.gyro_density_rad_per_s_per_sqrt_hz),
         ("accelerometer noise density", imu.accel_density_m_per_s2_per_sqrt_hz),
         ("lidar range noise", calibration.lidar.near_sigma_m),
     ];
-    match numbers.iter().find(|(_, x)| !(x.is_finite() && *x > 0.0)) {
-        Some((what, x)) => Err(EstimationError::Calibration(format!("{what} is {x}; must be above 0"))),
+    let fractions = [
+        ("scale error of the gyroscope", imu.gyro_scale_error),
+        ("misalignment of the gyroscope, rad,", imu.gyro_misalignment_rad),
+        ("scale error of the accelerometer", imu.accel_scale_error),
+        ("misalignment of the accelerometer, rad,", imu.accel_misalignment_rad),
+    ];
+    let invalid = |what, x, domain| EstimationError::Calibration(format!("{what} is {x}; must be {domain}"));
+    if let Some((what, x)) = densities.iter().find(|(_, x)| !(x.is_finite() && *x > 0.0)) {
+        return Err(invalid(what, x, "above 0"));
+    }
+    match fractions.iter().find(|(_, x)| !(0.0..=MAX_MATRIX_SIGMA).contains(x)) {
+        Some((what, x)) => Err(invalid(what, x, "from 0 to 0.2, the standard deviation over parts")),
         None => Ok(()),
     }
 }

@@ -2,7 +2,6 @@
 
 use super::Estimator;
 use super::phase::Tracking;
-use super::reports::report;
 use crate::EstimationError;
 use crate::intake::Segment;
 use crate::observed::ObservedPatch;
@@ -93,14 +92,8 @@ impl Estimator {
         self.clock_offsets.push((self.intake.stamp(window.unknowns.clock.at_s), window.unknowns.clock.offset_s));
         let moving = window.speed_m_per_s() > FAST_MOTION.0 || turns_fast;
         let elapsed_s = solution_s + solved.timing.views_s;
-        self.diagnostics.record(report(
-            solved,
-            window,
-            (&self.spec.solve, &self.calibration.imu),
-            stamp,
-            moving,
-            elapsed_s,
-        ));
+        let report = self.window_report(solved, window, stamp, moving, elapsed_s);
+        self.diagnostics.record(report);
     }
 
     /// Outputs the poses up to `final_until_s`, trajectory time, and forgets the states before them.

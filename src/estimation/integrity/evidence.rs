@@ -1,7 +1,7 @@
 //! Tests of the estimator's assumptions: findings, and factors on the error bound.
 
 use super::finding::{Cause, Finding, Status};
-use crate::{Discarded, MatrixEntry, Warning, WarningKind, WindowReport};
+use crate::{Discarded, Warning, WarningKind, WindowReport};
 use zsim_base::time::{Span, Stamp};
 
 /// If more than this fraction of the samples is clipped, a loss of tracking is attributed to it.
@@ -47,10 +47,8 @@ const CLOCK_RATE: Limits = Limits { degraded: 5e-4, lost: f64::INFINITY };
 /// Implausible speed, m/s: a result of dead reckoning.
 const SPEED_M_PER_S: Limits = Limits { degraded: 60.0, lost: 60.0 };
 
-/// Contradiction, residual (m) and IMU scale up to which the bound is not enlarged.
-const NOMINAL_EVIDENCE: (f64, f64, f64) = (0.4, 0.006, 0.004);
-/// The same for the IMU scale in standard deviations of the model.
-const NOMINAL_MODEL_SIGMAS: f64 = 3.0;
+/// Contradiction, residual (m), and IMU scale over its standard deviation, up to which the bound is not enlarged.
+const NOMINAL_EVIDENCE: (f64, f64, f64) = (0.4, 0.006, 1.8);
 /// Convergence is evaluated over this number of windows, 20 s at the default step.
 const CONVERGENCE_WINDOWS: usize = 40;
 /// Root mean square of the last corrections of converged windows, m or rad.
@@ -319,9 +317,7 @@ pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
         let is_weak = |w: &WindowReport| matches!(w.problem, Some(WarningKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_FACTOR } else { 1.0 };
-        let MatrixEntry { value, model_sigma } = windows[k].imu_matrix;
-        let nominal = NOMINAL_EVIDENCE.2.max(NOMINAL_MODEL_SIGMAS * model_sigma);
-        let scale = (value / nominal).powi(2).min(MAX_SCALE_FACTOR);
+        let scale = (windows[k].imu_matrix.over_model() / NOMINAL_EVIDENCE.2).powi(2).min(MAX_SCALE_FACTOR);
         let late = &windows[(k + 1).saturating_sub(of)..=k];
         let not_converged = not_converged(late, of).max(ill_conditioned(late, of));
         // A contradiction that noise does not explain causes an error that grows faster than linearly.
@@ -359,6 +355,7 @@ fn ill_conditioned(windows: &[WindowReport], of: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::MatrixEntry;
     use crate::Timing;
 
     /// Windows of a sound run, two per second.
