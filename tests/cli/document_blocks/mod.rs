@@ -11,10 +11,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Reads README.md, the pages of the book and the READMEs of the examples: paths relative to the repository, and texts.
+/// Reads README.md, the pages of the book, the READMEs of the examples, and the golden outputs of `tests/golden`: paths
+/// relative to the repository, and texts.
 fn documents() -> Vec<(PathBuf, String)> {
     let mut files = markdown("docs");
     files.append(&mut markdown("examples"));
+    files.append(&mut markdown("tests/golden"));
     files.insert(PathBuf::from("README.md"));
     let with_text = |file: PathBuf| {
         let text = std::fs::read_to_string(root().join(&file)).unwrap();
