@@ -216,16 +216,14 @@ pub(super) fn calibration(path: Option<&Path>) -> anyhow::Result<CalibrationSpec
     }
 }
 
-/// A pose on a map, `x,y,z,yaw`: metres, and degrees about the vertical.
+/// Parses a pose on a map, `x,y,z,yaw` such as `4.2,50cm,0,90`: lengths, and the angle about the vertical.
 pub(super) fn start(text: &str) -> Result<Pose, String> {
-    let numbers: Vec<f64> = text
-        .split(',')
-        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
-        .collect::<Option<_>>()
-        .ok_or_else(|| format!("`{text}` is not four numbers x,y,z,yaw"))?;
-    let [x, y, z, yaw_deg] = numbers[..] else {
-        return Err(format!("four numbers x,y,z,yaw are needed; here are {}", numbers.len()));
+    let words: Vec<&str> = text.split(',').collect();
+    let [x, y, z, yaw] = words[..] else {
+        return Err(format!("x,y,z,yaw are needed, as in 4.2,0.5,0,90; here are {} numbers", words.len()));
     };
+    let [x, y, z] = [x, y, z].map(quantity::metres);
+    let (x, y, z, yaw_deg) = (x?, y?, z?, quantity::degrees(yaw)?);
     let turn = Rotation::from_axis_angle(&Vector::z_axis(), yaw_deg.to_radians());
     Ok(Pose::from_parts(Vector::new(x, y, z).into(), turn))
 }

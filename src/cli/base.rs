@@ -1,13 +1,14 @@
 //! `zsim base`: the trajectory of the base from the trajectory of the head.
 
 use super::arguments::{Global, OutArguments};
-use super::{Completion, message, output};
+use super::{Completion, message, output, quantity};
 use anyhow::Context;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use zsim_base::geometry::{Trajectory, Vector};
-use zsim_dynamics::{self, HeadModel};
+use zsim_base::geometry::{Pose, Trajectory, Vector};
+use zsim_base::time::Stamp;
+use zsim_dynamics::{self, DynamicsError, HeadModel};
 use zsim_estimation::BaseEstimate;
 use zsim_evaluation::{Errors, Pairs};
 use zsim_recording::{Loss, Reader, Truth, read_tum, write_tum};
@@ -42,7 +43,7 @@ pub(super) struct Arguments {
     base_imu_topic: Option<String>,
     /// Time offset, IMU stamps minus trajectory stamps, accurate to 1 to 2 ms [default: estimated from the angular
     /// velocities, with drift]
-    #[arg(long, value_name = "MS", requires = "base_imu", allow_hyphen_values = true)]
+    #[arg(long, value_name = "TIME", requires = "base_imu", allow_hyphen_values = true, value_parser = quantity::milliseconds)]
     clock_offset_ms: Option<f64>,
     #[command(flatten)]
     out: OutArguments,
@@ -77,17 +78,17 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     );
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
     let by_spring = match &arguments.base_imu {
-        Some(_) => zsim_study::base_by_law(&head, &head_trajectory)?,
-        None => head.base_from_force_law(&head_trajectory)?,
+        Some(_) => Some(zsim_study::base_by_law(&head, &head_trajectory)?),
+        None => by_force_law(&head, &head_trajectory, global)?,
     };
     let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &head_trajectory));
     let by_imu = by_imu.transpose()?;
 
     let result = |key, name, base| MethodResult { key, name, base };
-    let mut results = vec![
-        result("rigid_link", "rigid link", Trajectory::from_poses(head.base_from_rigid_link(&head_trajectory))?),
-        result("spring", "spring law", Trajectory::from_poses(by_spring)?),
-    ];
+    let mut results =
+        vec![result("rigid_link", "rigid link", Trajectory::from_poses(head.base_from_rigid_link(&head_trajectory))?)];
+    let by_spring = by_spring.map(Trajectory::from_poses).transpose()?;
+    results.extend(by_spring.map(|base| result("spring", "spring law", base)));
     let (estimate, loss) = by_imu.unzip();
     results.extend(estimate.as_ref().map(|imu| result("imu", "base IMU and spring law", imu.trajectory.clone())));
     let wanted = arguments.out.out.clone().unwrap_or_else(|| PathBuf::from("results/base"));
@@ -113,6 +114,23 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let Some(loss) = loss.filter(|loss| !loss.is_none()) else { return Ok(Completion::Done) };
     loss.sentences().iter().for_each(|loss| message::loss(loss));
     Ok(Completion::WithLoss)
+}
+
+/// Computes the base by the spring law; `None`, with a note, if the linkage has no such law.
+fn by_force_law(
+    head: &HeadModel,
+    head_trajectory: &Trajectory,
+    global: &Global,
+) -> anyhow::Result<Option<Vec<(Stamp, Pose)>>> {
+    match head.base_from_force_law(head_trajectory) {
+        Err(error @ DynamicsError::BaseUnknown { .. }) => {
+            if !global.quiet {
+                message::note(&format!("base_spring.tum is not written: {error}"));
+            }
+            Ok(None)
+        }
+        poses => Ok(Some(poses?)),
+    }
 }
 
 fn by_imu(

@@ -35,8 +35,8 @@ pub(super) struct Arguments {
     /// Duration of the observation: 30s, 2min, 90
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = quantity::seconds, allow_hyphen_values = true)]
     duration: f64,
-    /// Start of the observation [default: after the initial rest of the motion]
-    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds, allow_hyphen_values = true)]
+    /// Start of the observation; motions/hand.ron rests until then
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = quantity::seconds_from_zero, allow_hyphen_values = true)]
     from: f64,
     /// Random seed of the motion
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -90,11 +90,11 @@ fn text(seen: &Coverage) -> String {
     let gyro = &seen.gyro;
     let mut rows = coverage_text::rows(seen);
     rows.extend([
-        ("time to half coverage, s", format!("{:.2}", seen.half_covered_s)),
-        ("beams per sr and s: mean, 10th percentile", {
+        ("time to half of the observed part, s", format!("{:.2}", seen.half_covered_s)),
+        ("beams per sr and s, mean and 10th percentile", {
             format!("{:.0}, {:.0}", seen.density_per_sr_s.mean, seen.density_per_sr_s.p10)
         }),
-        ("vertical field of view, deg", format!("{:.1} (95 % of the elevations)", seen.field_of_view_deg)),
+        ("elevation range of the forward beam (95 %), deg", format!("{:.1}", seen.field_of_view_deg)),
         ("maximum tilt of the scan plane, deg", format!("{:.1}", seen.most_tilt_deg)),
         ("maximum rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
         ("99th percentile of the rate, deg/s", format!("{:.0}", gyro.p99_deg_per_s)),

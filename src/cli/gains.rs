@@ -2,6 +2,7 @@
 
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
+use super::limit::fraction;
 use super::usage::Usage;
 use super::{Completion, output, quantity};
 use clap::{Args, ValueEnum};
@@ -44,7 +45,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value_t = Along::Acceleration)]
     along: Along,
     /// Damping ratio of all modes, instead of that of the head
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = fraction)]
     damping: Option<f64>,
     /// Number of realisations with different phases to average
     #[arg(long, value_name = "N", default_value_t = 4)]

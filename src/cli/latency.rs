@@ -29,7 +29,7 @@ pub(super) struct Arguments {
     /// The estimator's settings, a name under specs/estimators/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     estimator: String,
-    /// Folder for results; an interrupted study in it is continued [default: results/latency]
+    /// Folder for results; an interrupted study in it is continued
     #[arg(long, short, value_name = "DIR", default_value = "results/latency")]
     out: PathBuf,
     /// Replace another study in the folder; runs that are in both stay done
@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         .inspect_err(|_| super::full_run::print_partial_results(&folder))?;
     let merged = sweep::merge_with_bar(&planned, global)?;
     let failed =
-        || anyhow!("{} runs failed: {} has their errors", merged.status.failed, folder.join("table.csv").display());
+        || anyhow!("failed runs: {}; {} has their errors", merged.status.failed, folder.join("table.csv").display());
     let study = merged.latency.as_ref().ok_or_else(failed)?;
     output::print_result(global, &text_table(study), serde_json::to_value(study)?, Some(&folder))?;
     Ok(Completion::Done)

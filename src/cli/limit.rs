@@ -97,7 +97,7 @@ impl Limit {
         let Some(found) = figures.get(&self.key).and_then(Value::as_f64) else {
             let (key, text) = (&self.key, &self.text);
             return Some(format!(
-                "{name}: {key} is not known: the trajectory is too short, or the truth has no attitudes (limit {text})"
+                "{name}: {key} is not known: the trajectory is too short or its poses are too sparse, or the truth has no attitudes (limit {text})"
             ));
         };
         let within = found <= self.value;

@@ -21,6 +21,11 @@ const DURATION: Quantity = Quantity {
     example: "120s or 2min",
     units: &[("", 1.0), ("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("min", 60.0), ("m", 60.0), ("h", 3600.0)],
 };
+const OFFSET: Quantity = Quantity {
+    noun: "an offset of time",
+    example: "2ms or -0.1s",
+    units: &[("", 1.0), ("ms", 1.0), ("us", 1e-3), ("\u{b5}s", 1e-3), ("s", 1e3)],
+};
 const LENGTH: Quantity =
     Quantity { noun: "a length", example: "1.2m or 80cm", units: &[("", 1.0), ("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)] };
 const ANGLE: Quantity = Quantity {
@@ -70,6 +75,20 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     } else {
         Err(format!("the duration must be above 0 s and at most {MAX_S:e} s"))
     }
+}
+
+/// Parses a time as [`seconds`] does, which may be zero.
+pub(super) fn seconds_from_zero(text: &str) -> Result<f64, String> {
+    match DURATION.parse(text)? {
+        0.0 => Ok(0.0),
+        _ => seconds(text),
+    }
+}
+
+/// Parses an offset of time such as `-2ms`, `10us` or `-2`; returns milliseconds.
+pub(super) fn milliseconds(text: &str) -> Result<f64, String> {
+    let milliseconds = OFFSET.parse(text)?;
+    if milliseconds.abs() <= MAX_S { Ok(milliseconds) } else { Err(format!("the offset must be within {MAX_S:e} ms")) }
 }
 
 /// Parses a length such as `1.2m`, `80cm`, `900mm` or `1.2`; returns metres.

@@ -122,7 +122,7 @@ fn text(summary: &SimulationSummary, outputs: Outputs) -> String {
     }
     rows.push(row("IMU samples", format!("{} ({} saturated)", summary.imu_samples, summary.imu_samples_at_limit)));
     rows.extend(summary.coil_contact.map(|contact| {
-        row("coil contact", format!("from {:.2} s, for {:.2} s", contact.first_t_s, contact.contact_s))
+        row("coil contact", format!("first at {:.2} s, {:.2} s in total", contact.first_t_s, contact.contact_s))
     }));
     zsim_report::table(&[], &rows, true)
 }

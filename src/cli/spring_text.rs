@@ -29,7 +29,9 @@ fn figures(of: &PageTable) -> String {
 }
 
 fn under_shake(shaken: &ShakeResponse) -> String {
-    let header = ["response to a shake", "closed form", "simulated"];
+    let at = shaken.shake.frequency_hz.map_or("the slowest mode".to_owned(), |hz| format!("{hz:.2} Hz"));
+    let title = format!("response to a nod by {}\u{b0} at {at}", shaken.shake.pitch_deg);
+    let header = [title.as_str(), "closed form", "simulated"];
     let simulated = shaken.simulated.as_ref();
     let line = |name: &str, of: fn(&DesignMetrics) -> Option<f64>, decimals: usize| {
         let number = |figures: Option<&DesignMetrics>| {
@@ -38,7 +40,7 @@ fn under_shake(shaken: &ShakeResponse) -> String {
         vec![name.to_owned(), number(Some(&shaken.closed_form)), number(simulated)]
     };
     let mut rows = vec![
-        line("field of view, deg", |f| Some(f.field_of_view_deg), 1),
+        line("elevation range of the forward beam, deg", |f| Some(f.field_of_view_deg), 1),
         line("maximum rate, deg/s", |f| Some(f.rate_deg_per_s), 0),
         line("stress / yield stress", |f| f.stress_share, 3),
         line("smallest gap between coils, mm", |f| f.margins.gap_mm, 2),
@@ -58,7 +60,7 @@ fn under_shake(shaken: &ShakeResponse) -> String {
 /// The result of a search.
 pub(super) fn design(study: &DesignStudy) -> String {
     let mut text = format!(
-        "{} designs evaluated, {} within all limits, {} in the Pareto set\n",
+        "{} designs evaluated, {} within all limits in closed form, {} of them in the Pareto set\n",
         study.evaluated, study.feasible, study.pareto
     );
     text += &listed("rejected by", study.rejected.iter().map(|(limit, count)| (limit.as_str(), *count)));
@@ -76,15 +78,19 @@ pub(super) fn design(study: &DesignStudy) -> String {
         );
     }
     if study.candidates.is_empty() {
-        let advice = "no design is within all limits: widen the bounds, or relax the limit that rejects most designs";
+        let advice = match study.feasible {
+            0 => "no design is within all limits: widen the bounds, or relax the limit that rejects most designs",
+            _ => "no design is within all limits when it is simulated: relax the limit that rejects most designs there",
+        };
         return text + &wrapped(advice, "");
     }
     let header = ["spring", "Hz", "view", "rate", "g", "clash", "gap", "yield", "fatigue"];
     let rows: Vec<_> = study.candidates.iter().map(candidate_row).collect();
     let legend = "spring: name, or mean diameter x wire diameter x active coils x free length, mm. Hz: rocking frequency. g: \
                   mass of the wire. Simulated: view (field of view, deg), rate (maximum, deg/s), gap (smallest gap between \
-                  coils, mm), and the margins of clash, yield and fatigue; - if the strength is unknown. pareto.csv has \
-                  all figures, rejected.csv why others are no candidates.";
+                  coils, mm), and the margins of clash, yield and fatigue; - where a margin is unknown or does not apply. \
+                  pareto.csv has all figures; rejected.csv has the rejected springs of a catalogue, and the designs that the \
+                  simulation rejected.";
     format!("{text}\n{}\n{}{}", table(&header, &rows, true), wrapped(legend, ""), journeys(study))
 }
 

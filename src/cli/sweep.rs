@@ -5,7 +5,7 @@ use super::bars::{WorkBar, end_polling, stop_flag};
 use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
 use super::{Completion, output, repeat, submit};
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
@@ -39,7 +39,9 @@ impl Arguments {
 enum Command {
     Plan(PlanArguments),
     Run(RunArguments),
+    /// Report how many runs of a sweep are complete, failed or missing
     Status(FolderArguments),
+    /// Merge the finished runs to table.csv, with a summary, plots and a page
     Merge(FolderArguments),
     Repeat(repeat::Arguments),
     Submit(submit::Arguments),
@@ -84,7 +86,7 @@ struct RunArguments {
     keep_runs: bool,
 }
 
-/// The folder of a sweep
+// Without a docstring: it would replace those of the commands.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  zsim sweep status results/springs --json\n  zsim sweep merge results/springs")]
 struct FolderArguments {
@@ -219,6 +221,10 @@ pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Re
     let words = format!("{}\n{}", merged.text, status_text(&merged.status));
     let figures = json!({ "status": merged.status, "summary": merged.summary });
     output::print_result(global, &words, figures, Some(folder))?;
+    if merged.status.failed == merged.status.points {
+        let first = sweep.first_failure()?.unwrap_or_default();
+        bail!("all {} runs failed: {first}", merged.status.points);
+    }
     Ok(if merged.status.missing == 0 { Completion::Done } else { Completion::WithLoss })
 }
 

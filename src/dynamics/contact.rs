@@ -64,7 +64,7 @@ impl CoilContact {
     /// The warning for the user.
     pub fn warning(&self) -> String {
         format!(
-            "warning: t = {:.2} s: the coils of the spring touch at a bend of {:.0} degrees (in contact for {:.2} s, overlap \
+            "t = {:.2} s: the coils of the spring touch while its ends are {:.0} degrees apart (in contact for {:.2} s, overlap \
              up to {:.2} mm); they stop each other by a contact softer than that of steel, so the motion from there on is \
              approximate: use a spring with larger gaps, an end stop, or less motion",
             self.first_t_s, self.first_bend_deg, self.contact_s, -self.least_gap_mm

@@ -33,7 +33,9 @@ pub enum DynamicsError {
         fastest_hz: f64,
     },
     /// The base cannot be computed from the motion of the head in this linkage.
-    #[error("the motion of a head on {constraint} does not determine the pose of the base: use the rigid link instead")]
+    #[error(
+        "the motion of a head on {constraint} does not determine the pose of the base; this needs a head on springs or cords"
+    )]
     BaseUnknown {
         /// The constraint: a motor or a joint.
         constraint: &'static str,

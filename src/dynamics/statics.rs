@@ -50,7 +50,9 @@ pub(super) enum NoEquilibrium {
     Unstable,
     #[error("there is no equilibrium near base_from_head: the head falls, sinks or turns over")]
     NotFound,
-    #[error("the equilibrium is {shift_mm:.0} mm and {turn_deg:.0} degrees away from base_from_head")]
+    #[error(
+        "the equilibrium is {shift_mm:.0} mm and {turn_deg:.0} degrees away from base_from_head, where the search ends"
+    )]
     TooFar { shift_mm: f64, turn_deg: f64 },
     #[error("no spring, rope, joint or buoyancy resists a {0}")]
     Unconstrained(&'static str),

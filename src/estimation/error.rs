@@ -320,8 +320,8 @@ impl fmt::Display for WarningKind {
             ),
             Self::NoisyImu { gyro, accel } => write!(
                 f,
-                "the IMU noise at rest exceeds the specification by a factor of {gyro:.1} (gyroscope) and {accel:.1} \
-                 (accelerometer); the measured noise is used"
+                "the IMU noise at rest is {gyro:.1} (gyroscope) and {accel:.1} (accelerometer) times that of the model; the \
+                 measured noise is used"
             ),
             Self::ImuGap { seconds } => {
                 write!(f, "no IMU sample for {seconds:.3} s; bridged by interpolation")
@@ -359,7 +359,7 @@ impl fmt::Display for WarningKind {
             }
             Self::Saturated { samples } => write!(
                 f,
-                "{samples} clipped IMU samples so far; check the units (rad/s, m/s^2), and the range in the calibration \
+                "{samples} saturated IMU samples so far; check the units (rad/s, m/s^2), and the range in the calibration \
                  (`gyro_limit_rad_per_s`, `accel_limit_m_per_s2`)"
             ),
         }

@@ -50,9 +50,7 @@ pub enum RecordingError {
         problem: String,
     },
     /// An SQLite database that rosbag2 did not write, or that is damaged.
-    #[error(
-        "{name}: not a readable rosbag2 database: {problem}; recover the readable rows with `sqlite3 {name} .recover`"
-    )]
+    #[error("{name}: not a readable rosbag2 database: {problem}")]
     Database {
         /// Name of the file.
         name: String,
@@ -114,7 +112,10 @@ pub enum RecordingError {
         has: String,
     },
     /// The recording is incomplete, but all of it is needed.
-    #[error("{name}: the recording is cut short or damaged, so poses may be missing; repair it with `mcap recover`")]
+    #[error(
+        "{name}: the recording is cut short or damaged, so poses may be missing; repair it first (`mcap recover`, `rosbag reindex`, or \
+         `sqlite3 {name} .recover`)"
+    )]
     NotWhole {
         /// Name of the file.
         name: String,

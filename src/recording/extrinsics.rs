@@ -14,8 +14,8 @@ const STATIC: &str = "tf_static";
 /// Last part of the name of the topic of repeated transforms.
 const REPEATED: &str = "tf";
 
-const REMEDY: &str = "Select another sensor with --lidar-topic or --imu-topic, or give both poses with --calibration; a lidar on a \
-                      rotating mount is not supported";
+const REMEDY: &str = "Select another lidar or IMU topic, or give both poses in a calibration (`zsim estimate`: --lidar-topic, --imu-topic, \
+                      --calibration); a lidar on a rotating mount is not supported";
 
 /// Calibration, and the origin of the poses.
 #[derive(Debug, Clone, PartialEq)]

@@ -103,14 +103,11 @@ impl Loss {
 
     /// Notes on data skipped without loss, one sentence each.
     pub fn notes(&self) -> Vec<String> {
-        let counted = |count: u64, sentence: &str| (count > 0).then(|| format!("{count} {sentence}"));
+        let counted = |count: u64, what: &str| (count > 0).then(|| format!("{what}: {count}"));
         let counts = [
-            counted(self.repeated_scans, "duplicate scans were ignored"),
-            counted(self.repeated_samples, "duplicate IMU samples were ignored"),
-            counted(
-                self.outlying_stamps,
-                "messages were dropped: their stamps are far from those before and after them",
-            ),
+            counted(self.repeated_scans, "duplicate scans ignored"),
+            counted(self.repeated_samples, "duplicate IMU samples ignored"),
+            counted(self.outlying_stamps, "dropped messages, whose stamps are far from those before and after them"),
         ];
         let other_frame = |other: &OtherFrame| {
             let OtherFrame { topic, frame, messages } = other;

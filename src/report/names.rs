@@ -3,7 +3,7 @@
 use zsim_base::spec::split_unit;
 
 /// Keys with another name than their own words. The unit follows from the key.
-const NAMES: [(&str, &str); 15] = [
+const NAMES: [(&str, &str); 14] = [
     ("bias_sigma_m", "standard deviation of the range bias"),
     ("bracket_kg", "mass of the bracket"),
     ("imu", "IMU"),
@@ -11,7 +11,6 @@ const NAMES: [(&str, &str); 15] = [
     ("min_sweep_deg_per_s", "minimum rotation rate out of the scan plane"),
     ("n_per_m", "stiffness"),
     ("noise_m", "range noise"),
-    ("rate_hz", "scan rate"),
     ("seed", "random seed"),
     ("x", "translation along x"),
     ("x_rot", "rotation about x"),
@@ -52,7 +51,7 @@ mod tests {
     fn keys_become_words_with_their_unit_in_parentheses() {
         for (key, name) in [
             ("wire_diameter_mm", "wire diameter (mm)"),
-            ("rate_hz", "scan rate (Hz)"),
+            ("rate_hz", "rate (Hz)"),
             ("divergence_half_angle_mrad", "divergence half angle (mrad)"),
             ("max_drift_m_per_min", "max drift (m/min)"),
             ("angle_deg", "angle (°)"),

@@ -3,6 +3,8 @@
 /// Formats a length in m.
 pub fn length(metres: f64) -> String {
     match metres.abs() {
+        // The rest of an alignment, not a length.
+        m if m < 1e-12 => "0 mm".to_owned(),
         m if m < 0.0995 => format!("{} mm", digits(metres * 1e3)),
         m if m < 0.995 => format!("{} cm", digits(metres * 1e2)),
         m if m < 995.0 => format!("{} m", digits(metres)),

@@ -69,8 +69,8 @@ fn open_loop(metrics: &Metrics) -> Group {
     let m = &metrics.open_loop;
     let mut rows = RowBuilder(Vec::new());
     let took = m.wall_s.zip(m.fraction_of_acquisition);
-    rows.add("wall time", took, |(s, fraction)| format!("{} ({} of acquisition)", time(s), percent(fraction)));
-    rows.add("fixed views", m.fixed_views, count);
+    rows.add("wall time", took, |(s, fraction)| format!("{} ({} of the recording)", time(s), percent(fraction)));
+    rows.add("fixed views (setting)", m.fixed_views, count);
     rows.add("position RMSE", m.position_rmse_m, length);
     rows.add("rotation RMSE", m.rotation_rmse_deg, degrees);
     rows.add("drift", m.drift_m_per_min, per_minute);
@@ -85,15 +85,15 @@ fn closed_loop(metrics: &Metrics) -> Group {
     let m = &metrics.closed_loop;
     let mut rows = RowBuilder(Vec::new());
     let took = m.wall_s.zip(m.fraction_of_acquisition);
-    rows.add("wall time", took, |(s, fraction)| format!("{} ({} of acquisition)", time(s), percent(fraction)));
+    rows.add("wall time", took, |(s, fraction)| format!("{} ({} of the recording)", time(s), percent(fraction)));
     rows.add("position RMSE", m.position_rmse_m, length);
     rows.add("rotation RMSE", m.rotation_rmse_deg, degrees);
-    rows.add("information bound", m.bound_rmse_m, length);
+    rows.add("information bound, known map", m.bound_rmse_m, length);
     let loops = m.loops.proposed.zip(m.loops.verified).zip(m.loops.closed).filter(|((proposed, _), _)| *proposed > 0);
     rows.add("loop closures", loops, |((proposed, verified), closed)| {
         format!("{} ({} proposed, {} verified)", count(closed), count(proposed), count(verified))
     });
-    rows.add("loop closure not applied", m.left.as_deref(), str::to_owned);
+    rows.add("not applied", m.left.as_deref(), str::to_owned);
     rows.titled("closed loop")
 }
 
@@ -129,11 +129,12 @@ fn sensors(metrics: &Metrics) -> Group {
 fn cloud(metrics: &Metrics) -> Group {
     let m = &metrics.cloud;
     let mut rows = RowBuilder(Vec::new());
-    rows.add("points", m.points, count);
+    rows.add("points before filtering", m.points, count);
+    rows.add("points in the file", m.filter.kept, count);
     rows.add("bias", m.bias_m, length);
     rows.add("sigma, static points", m.sigma_m, length);
     rows.add("sigma, true trajectory", m.sigma_by_truth_m, length);
-    rows.add("95th percentile", m.p95_m, length);
+    rows.add("95th percentile of the distance, static points", m.p95_m, length);
     rows.add("more than 1 m off", m.far_fraction, percent);
     rows.add("on the carrier", m.on_carrier_fraction, percent);
     rows.add("on moving objects", m.on_movers_fraction, percent);

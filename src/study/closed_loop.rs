@@ -19,7 +19,7 @@ pub(super) struct ClosedLoopRun {
     pub open_loop_recalibrated: Option<Trajectory>,
     /// Loop closures.
     pub loops: LoopReport,
-    /// The reason why the loop closure was not applied; `None` if it was.
+    /// The reason why the registration was not applied; `None` if it was.
     pub rejected_because: Option<&'static str>,
     /// Messages to the user.
     pub notes: Vec<String>,
@@ -37,10 +37,10 @@ pub(super) fn run_closed_loop(
     let OpenLoopRun { map_from_head, covariances, lidar, observed, .. } = run;
     let closed = register(RegistrationInput { map_from_head, covariances, lidar, observed }, calibration, estimator)?;
     let (loops, rejected_because) = (closed.report.loops, closed.report.rejected_because);
-    let rejected =
-        rejected_because.map(|why| format!("loop closure not applied ({why}); the result is the open-loop trajectory"));
-    let closed_loops = (loops.closed > 0).then(|| {
-        format!("the open loop drifted beyond the matching distance; {} loop closures corrected it", loops.closed)
+    let rejected = rejected_because
+        .map(|why| format!("global registration not applied ({why}); the result is the open-loop trajectory"));
+    let closed_loops = (loops.closed > 0 && rejected_because.is_none()).then(|| {
+        format!("the open loop drifted beyond the matching distance; loop closures that corrected it: {}", loops.closed)
     });
     Ok(ClosedLoopRun {
         map_from_head: closed.trajectory,

@@ -9,6 +9,12 @@ use zsim_report::{NoiseMetrics, SensorMetrics, noise_sources};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use zsim_simulation::Run;
 
+/// Noise of a simulated sensor that has none, because the estimator weights residuals by it: densities of gyroscope,
+/// rad/s/sqrt(Hz), and accelerometer, m/s^2/sqrt(Hz), below those of tactical IMUs, and standard deviation of ranges, m.
+const LEAST_GYRO_DENSITY: f64 = 1e-6;
+const LEAST_ACCEL_DENSITY: f64 = 1e-5;
+const LEAST_RANGE_SIGMA_M: f64 = 5e-4;
+
 /// Where the value of a sensor model comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ValueSource {
@@ -16,6 +22,8 @@ pub(super) enum ValueSource {
     Calibration,
     /// The manifest of the simulation in the recording.
     Manifest,
+    /// The least noise, for a simulated sensor without any.
+    Least,
     /// The default for unknown sensors.
     Assumed,
 }
@@ -25,6 +33,7 @@ impl fmt::Display for ValueSource {
         f.write_str(match self {
             Self::Calibration => "from --calibration",
             Self::Manifest => "from the recording's manifest",
+            Self::Least => "the least that is used; it is 0 in the recording's manifest",
             Self::Assumed => "assumed",
         })
     }
@@ -158,7 +167,7 @@ impl SensorModels {
         let sources = if imu == lidar { imu.clone() } else { format!("IMU {imu}; lidar {lidar}") };
         let unknown: Vec<&str> = [
             (imu, "IMU noise of a typical IMU (specs/imus/unknown.ron)"),
-            (lidar, "range noise of a UTM-30LX (10 mm)"),
+            (lidar, "range noise of a UTM-30LX (10 mm up to 10 m, 30 mm at 30 m)"),
         ]
         .into_iter()
         .filter(|(sources, _)| sources.contains(&ValueSource::Assumed.to_string()))
@@ -187,15 +196,29 @@ impl Values {
         value
     }
 
+    /// As [`value`](Self::value), for noise that the estimator needs: a simulated sensor may have none.
+    fn noise(&mut self, key: &str, given: Option<f64>, otherwise: f64, least: f64) -> f64 {
+        match given {
+            None if otherwise == 0.0 => {
+                self.noise.push((key.to_owned(), least, ValueSource::Least));
+                least
+            }
+            given => self.value(key, given, otherwise),
+        }
+    }
+
     fn imu(&mut self, given: ImuNoiseSpec, otherwise: &ImuNoise) -> ImuNoise {
         macro_rules! value {
             ($key:ident) => {
                 self.value(concat!("imu.", stringify!($key)), given.$key, otherwise.$key)
             };
+            ($key:ident, at least $least:expr) => {
+                self.noise(concat!("imu.", stringify!($key)), given.$key, otherwise.$key, $least)
+            };
         }
         ImuNoise {
-            gyro_density_rad_per_s_per_sqrt_hz: value!(gyro_density_rad_per_s_per_sqrt_hz),
-            accel_density_m_per_s2_per_sqrt_hz: value!(accel_density_m_per_s2_per_sqrt_hz),
+            gyro_density_rad_per_s_per_sqrt_hz: value!(gyro_density_rad_per_s_per_sqrt_hz, at least LEAST_GYRO_DENSITY),
+            accel_density_m_per_s2_per_sqrt_hz: value!(accel_density_m_per_s2_per_sqrt_hz, at least LEAST_ACCEL_DENSITY),
             gyro_bias_walk_rad_per_s_per_sqrt_s: value!(gyro_bias_walk_rad_per_s_per_sqrt_s),
             accel_bias_walk_m_per_s2_per_sqrt_s: value!(accel_bias_walk_m_per_s2_per_sqrt_s),
             gyro_turn_on_bias_rad_per_s: value!(gyro_turn_on_bias_rad_per_s),
@@ -211,9 +234,14 @@ impl Values {
 
     fn lidar(&mut self, given: LidarNoiseSpec, otherwise: &LidarNoise) -> LidarNoise {
         LidarNoise {
-            near_sigma_m: self.value("lidar.near_sigma_m", given.near_sigma_m, otherwise.near_sigma_m),
+            near_sigma_m: self.noise(
+                "lidar.near_sigma_m",
+                given.near_sigma_m,
+                otherwise.near_sigma_m,
+                LEAST_RANGE_SIGMA_M,
+            ),
             near_m: self.value("lidar.near_m", given.near_m, otherwise.near_m),
-            far_sigma_m: self.value("lidar.far_sigma_m", given.far_sigma_m, otherwise.far_sigma_m),
+            far_sigma_m: self.noise("lidar.far_sigma_m", given.far_sigma_m, otherwise.far_sigma_m, LEAST_RANGE_SIGMA_M),
             far_m: self.value("lidar.far_m", given.far_m, otherwise.far_m),
         }
     }

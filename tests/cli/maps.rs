@@ -76,7 +76,10 @@ fn invalid_maps_and_starts_are_errors_and_create_no_folder() {
     let (code, _, stderr) = run(here.path(), "map merge broken.ply absent.ply --out both.ply");
     assert!(code == 1 && stderr.contains("broken.ply:4"), "{code} {stderr}");
     let (code, _, stderr) = run(here.path(), "estimate a.mcap --map broken.ply --start 1,2");
-    assert!(code == 2 && stderr.contains("four numbers x,y,z,yaw are needed; here are 2"), "{code} {stderr}");
+    assert!(
+        code == 2 && stderr.contains("x,y,z,yaw are needed, as in 4.2,0.5,0,90; here are 2 numbers"),
+        "{code} {stderr}"
+    );
     let (code, _, _) = run(here.path(), "estimate a.mcap --extend-map");
     assert_eq!(code, 2, "without a map there is nothing to extend");
     assert!(!here.path().join("out").exists() && !here.path().join("both.ply").exists());

@@ -8,12 +8,12 @@ fn a_plan_shows_the_cut_walls_and_the_route() {
     let (code, out, errors) = run(here.path(), "scene plan office office.svg --height 150cm");
     assert_eq!((code, out.lines().last()), (0, Some("office.svg")), "{errors}");
     let svg = std::fs::read_to_string(here.path().join("office.svg")).unwrap();
-    for text in ["cut at a height of 1.5 m", "Elevation", "x (m)", "z (m)", "default route", "start"] {
+    for text in ["cut at z = 1.5 m", "Elevation", "x (m)", "z (m)", "default route", "start"] {
         assert!(svg.contains(text), "{text}");
     }
     let (_, _, errors) = run(here.path(), "scene plan office high.svg --height 100m");
     assert_eq!(errors, "", "a cut above the scene shows the scene from above");
-    assert!(std::fs::read_to_string(here.path().join("high.svg")).unwrap().contains("cut at a height of 100.0 m"));
+    assert!(std::fs::read_to_string(here.path().join("high.svg")).unwrap().contains("cut at z = 100.0 m"));
 }
 
 #[test]

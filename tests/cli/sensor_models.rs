@@ -172,3 +172,21 @@ fn an_imu_is_judged_by_the_scale_error_of_its_model() {
         assert!(code != 0 && code != 3 && stderr.contains("scale error of the gyroscope"), "{scale}: {code} {stderr}");
     }
 }
+
+/// A simulated sensor may have no noise; the estimator weights its residuals by the noise. This was an error after the whole
+/// simulation, also for a shipped IMU.
+#[test]
+fn sensors_without_noise_are_estimated() {
+    let here = tempfile::tempdir().unwrap();
+    let exact =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("specs/lidars/utm30lx_exact.ron")).unwrap();
+    let exact = exact.replace("near_sigma_m: 0.010", "near_sigma_m: 0").replace("far_sigma_m: 0.030", "far_sigma_m: 0");
+    std::fs::write(here.path().join("noiseless.ron"), exact).unwrap();
+    let command = "--scene mocap_room --imu ideal_1khz --lidar noiseless.ron --clock exact --duration 10s --metrics-only --out run";
+    let (code, _, stderr) = run(here.path(), command);
+    assert_eq!(code, 0, "{stderr}");
+    let metrics: Value = serde_json::from_slice(&std::fs::read(here.path().join("run/metrics.json")).unwrap()).unwrap();
+    assert!(metrics["open_loop"]["position_rmse_m"].as_f64().unwrap() < 2e-3, "{metrics}");
+    let (value, source) = noise(&metrics, "imu.gyro_density_rad_per_s_per_sqrt_hz");
+    assert_eq!((value, source), (1e-6, "the least that is used; it is 0 in the recording's manifest"));
+}

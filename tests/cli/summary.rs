@@ -32,7 +32,7 @@ fn the_summary_has_the_known_figures_in_80_columns() {
     let text = summary(&metrics());
     println!("{text}");
     assert!(text.starts_with("office, 2.00 min, seed 1\n"));
-    for words in ["60.0 x real time", "4.20 s (3.50 % of acquisition)", "12.3 mm", "4.32 km/min", "13.4 mm"] {
+    for words in ["60.0 x real time", "4.20 s (3.50 % of the recording)", "12.3 mm", "4.32 km/min", "13.4 mm"] {
         assert!(text.contains(words), "{words} is missing in:\n{text}");
     }
     assert!(!text.contains("closed loop"), "the summary has rows without figures");

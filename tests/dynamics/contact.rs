@@ -52,7 +52,7 @@ fn coils_touch_at_the_bend_that_closes_their_gaps() {
         assert!(touched.first_bend_deg > 0.5 * uniform_deg && touched.first_bend_deg < uniform_deg, "{touched:?}");
         assert!(touched.contact_s > 0.0 && touched.least_gap_mm < 0.0, "{touched:?}");
         let text = touched.warning();
-        assert!(text.starts_with(&format!("warning: t = {:.2} s: ", touched.first_t_s)), "{text}");
+        assert!(text.starts_with(&format!("t = {:.2} s: the coils", touched.first_t_s)), "{text}");
         // A tenth of the nod, and gaps three times as large, are without contact.
         assert_eq!(contact(46.0, 0.6, segments), None);
         assert_eq!(contact(66.0, 3.0, segments), None);

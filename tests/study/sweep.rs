@@ -416,12 +416,13 @@ fn a_failed_run_is_a_row_and_the_others_continue() {
     assert!(errors[2].contains("cannot stand on the spring") && errors[3] == errors[2], "{errors:?}");
 
     std::fs::write(here.path().join("late.ron"), spec.replace("time_s: 300.0", "time_s: 0.01")).unwrap();
-    run_ok(here.path(), "study late.ron -o late");
+    let (code, _, stderr) = run(here.path(), "study late.ron -o late");
+    assert!(code == 1 && stderr.contains("all 4 runs failed: took longer than 0.01 s"), "{code} {stderr}");
     assert!(column(&here.path().join("late"), "error")[0].contains("took longer than 0.01 s"));
 
     if cfg!(target_os = "linux") {
         std::fs::write(here.path().join("large.ron"), spec.replace("memory_mib: 2048", "memory_mib: 12")).unwrap();
-        run_ok(here.path(), "study large.ron -o large");
+        assert_eq!(run(here.path(), "study large.ron -o large").0, 1);
         let table = std::fs::read_to_string(here.path().join("large/table.csv")).unwrap();
         assert!(table.lines().nth(1).is_some_and(|first| first.contains("memory")), "{table}");
     }

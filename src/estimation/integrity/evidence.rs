@@ -197,7 +197,7 @@ fn window_findings(evidence: &Evidence) -> Vec<Finding> {
     };
     add(over_intervals(windows, both, INCONSISTENT), &|ratio, _, _| Cause::Inconsistent { ratio });
     add(over_intervals(windows, untracked, UNTRACKED_FRACTIONS), &|_, from, to| Cause::FewMatches {
-        seconds: to.seconds_since(from),
+        seconds: untracked_s(windows, from, to),
     });
     add(over_intervals(windows, fastest, SPEED_M_PER_S), &|speed_m_per_s, _, _| Cause::Speed { speed_m_per_s });
     // The head matches no surface for most of the run, and does not rest, or might move at constant velocity where the
@@ -217,6 +217,14 @@ fn window_findings(evidence: &Evidence) -> Vec<Finding> {
         to,
     }));
     all
+}
+
+/// Returns the duration of the untracked windows from `from` to `to`, s.
+fn untracked_s(windows: &[WindowReport], from: Stamp, to: Stamp) -> f64 {
+    let within = windows.iter().filter(|window| (from..=to).contains(&window.stamp));
+    let (all, untracked) =
+        within.fold((0, 0), |(all, found), window| (all + 1, found + i32::from(is_untracked(window))));
+    f64::from(untracked) / f64::from(all.max(1)) * to.seconds_since(from)
 }
 
 /// If most windows have no match and fulfil `condition`: their total duration (s), and start and end of the run.

@@ -210,7 +210,11 @@ impl fmt::Display for Cause {
                 )
             }
             Self::PoorFit { residual_m } => {
-                write!(f, "matched surfaces fit to {:.0} mm only; map and trajectory are distorted", residual_m * 1e3)
+                write!(
+                    f,
+                    "matched surfaces fit to {:.0} mm only; map and trajectory may be distorted",
+                    residual_m * 1e3
+                )
             }
             Self::NotRelocalised => {
                 write!(f, "relocalisation failed after a gap; the trajectory after it has an unknown offset")
@@ -218,10 +222,13 @@ impl fmt::Display for Cause {
             Self::Speed { speed_m_per_s } => write!(f, "implausible velocity of {speed_m_per_s:.0} m/s"),
             Self::Gap { sensor, seconds } => write!(f, "gap of {seconds:.2} s in the {sensor} data"),
             Self::NotCovered { seconds } => {
-                write!(f, "{seconds:.1} s of the recording have no estimate (a sensor is missing there)")
+                write!(f, "no estimate for {seconds:.1} s at the start and end of the recording")
             }
             Self::Clipped { fraction } => {
-                write!(f, "{:.1} % of the IMU samples are clipped at the end of the sensor's range", fraction * 1e2)
+                write!(f, "{:.1} % of the IMU samples are saturated", fraction * 1e2)
+            }
+            Self::Frozen { sensor: "lidar", count } => {
+                write!(f, "the lidar repeats scans, or all beams of a scan have one range ({count} scans discarded)")
             }
             Self::Frozen { sensor, count } => write!(f, "the {sensor} repeats the same reading ({count} discarded)"),
             Self::RangeCorrection { correction_m } => {

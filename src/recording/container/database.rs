@@ -73,12 +73,12 @@ impl SqliteDatabase {
         database
             .execute_batch("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON; PRAGMA query_only = ON;")
             .and_then(|()| database.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_MESSAGE_BYTES))
-            .map_err(|error| database_error(error.to_string()))?;
+            .map_err(|error| database_error(unreadable(&error)))?;
         for (table, columns) in TABLES {
             check_table(&database, table, columns).map_err(&database_error)?;
         }
         let mut index = FileIndex::empty();
-        read_topics(&database, &mut index, budget).map_err(|error| database_error(error.to_string()))??;
+        read_topics(&database, &mut index, budget).map_err(|error| database_error(unreadable(&error)))??;
         index.ending = match build_blocks(&database, &mut index, budget) {
             Ok(Ok(true)) => Ending::Complete,
             Ok(Ok(false)) | Err(_) => Ending::CutShort,
@@ -131,25 +131,30 @@ fn time_ns(row: &Row<'_>, index: usize) -> rusqlite::Result<u64> {
     Ok(u64::try_from(row.get::<_, i64>(index)?).unwrap_or(0))
 }
 
+/// Describes an error of SQLite, with the remedy.
+fn unreadable(error: &rusqlite::Error) -> String {
+    format!("{error}; recover the readable rows with `sqlite3 FILE .recover`")
+}
+
 /// Checks that `table` is an ordinary table with stored `columns`.
 ///
 /// A view or a computed column may take unlimited time.
 fn check_table(database: &Connection, table: &str, columns: &[&str]) -> Result<(), String> {
     let text =
         "SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND name = ?1 AND type = 'table' AND wr = 0";
-    let count: i64 = database.query_row(text, [table], |row| row.get(0)).map_err(|error| error.to_string())?;
+    let count: i64 = database.query_row(text, [table], |row| row.get(0)).map_err(|error| unreadable(&error))?;
     if count != 1 {
         return Err(format!("it has no table `{table}`"));
     }
     let text = "SELECT count(*) FROM pragma_table_xinfo(?1) WHERE lower(name) = 'rowid'";
-    let count: i64 = database.query_row(text, [table], |row| row.get(0)).map_err(|error| error.to_string())?;
+    let count: i64 = database.query_row(text, [table], |row| row.get(0)).map_err(|error| unreadable(&error))?;
     if count != 0 {
         return Err(format!("its table `{table}` has a column `rowid` that hides the row number"));
     }
     for column in columns {
         let text = "SELECT count(*) FROM pragma_table_xinfo(?1) WHERE name = ?2 AND hidden = 0";
         let count: i64 =
-            database.query_row(text, [table, column], |row| row.get(0)).map_err(|error| error.to_string())?;
+            database.query_row(text, [table, column], |row| row.get(0)).map_err(|error| unreadable(&error))?;
         if count != 1 {
             return Err(format!("its table `{table}` has no column `{column}`"));
         }

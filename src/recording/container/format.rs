@@ -111,7 +111,7 @@ impl RecordingFile {
             return Self::from_records(0, source, format, &mut budget);
         }
         if length > MAX_IN_MEMORY_BYTES {
-            let problem = "it exceeds the 1 GiB limit for a stream".to_owned();
+            let problem = "it exceeds the 1 GiB limit for a stream; save it as a file and give its path".to_owned();
             return Err(RecordingError::Database { name: name.to_owned(), problem });
         }
         let mut bytes = Vec::new();

@@ -55,7 +55,7 @@ const NO_RATE: &str = "has zeros for angular velocity, and no other topic has it
                        driver merge them (`unite_imu_method` of realsense2_camera)";
 const NO_FORCE: &str = "has zeros for acceleration, and no other topic has it; record the accelerometer's topic too, or let the \
                         driver merge them (`unite_imu_method` of realsense2_camera)";
-const NO_DATA: &str = "has zeros for acceleration and angular velocity; select another topic with --imu-topic, or configure the \
+const NO_DATA: &str = "has zeros for acceleration and angular velocity; select another IMU topic, or configure the \
                        driver to publish them";
 
 impl Reader {
@@ -148,8 +148,8 @@ impl Reader {
             let problem = format!(
                 "has accelerations without gravity (median {median:.2} m/s^2); the estimate needs specific force as the \
                  accelerometer measures it, gravity included (REP-145): record the driver's raw accelerations, not its linear ones \
-                 (BNO08x: accelerometer, not linear acceleration; Android: TYPE_ACCELEROMETER), or select another topic \
-                 with --imu-topic"
+                 (BNO08x: accelerometer, not linear acceleration; Android: TYPE_ACCELEROMETER), or select another \
+                 IMU topic"
             );
             self.imu_error(forces, problem)
         })

@@ -88,7 +88,7 @@ fn check_times(fault: &FaultSpec) -> Result<(), Problem> {
     }
     let from_s = fault.from_s.unwrap_or(0.0);
     if let Some(to_s) = fault.to_s.filter(|to_s| *to_s <= from_s) {
-        let message = format!("the fault ends at {to_s} s, before it begins at {from_s} s");
+        let message = format!("the fault ends at {to_s} s, not after its start at {from_s} s");
         return Err(Problem("to_s", message, "make to_s larger than from_s"));
     }
     match (fault.every_s, fault.lasts_s) {

@@ -69,7 +69,7 @@ pub fn curve_figure(study: &LatencyResult) -> Figure {
     let over_noise = |run: &LatencyRun| run.disturbance.noise_ms;
     let (sigma, rmse): (ErrorMeasure, ErrorMeasure) = (|run| run.cloud_sigma_m, |run| run.position_rmse_m);
     let (cloud, position) = ("Standard deviation of the cloud (mm)", "Position error, RMS (mm)");
-    let (latency, noise) = ("Latency of the IMU stamps (ms)", "Standard deviation of the scan stamps (ms)");
+    let (latency, noise) = ("Latency of the IMU stamps (ms)", "Standard deviation of the noise on scan stamps (ms)");
     let chart = |labels: (&str, &str), of: &dyn Fn(ClockState) -> Vec<(f64, ConfidenceInterval)>| {
         let series = |name: &str, clock, colour| curve(name, colour, &of(clock));
         let dots = |clock, colour| {

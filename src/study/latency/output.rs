@@ -53,12 +53,12 @@ pub fn text_table(study: &LatencyResult) -> String {
 pub(crate) fn conclusions(study: &LatencyResult) -> Vec<String> {
     let at = |minimum: Option<ConfidenceInterval>| match minimum {
         Some(ConfidenceInterval { value, low, high }) => format!("at {value:+.3} ms (95 %: {low:+.3} to {high:+.3})"),
-        None => "at no latency (no minimum)".to_owned(),
+        None => "not found".to_owned(),
     };
     let rises = if study.minimum.rises_on_both_sides { "increases" } else { "does not increase monotonically" };
     vec![
         format!(
-            "Clock state off: the cloud's sigma is minimal {}, the position error {}; sigma {rises} on both sides of zero.",
+            "Clock state off: minimum of the cloud's sigma {}, of the position error {}; sigma {rises} on both sides of zero.",
             at(study.minimum.cloud_ms),
             at(study.minimum.position_ms)
         ),

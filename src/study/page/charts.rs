@@ -135,7 +135,7 @@ fn loops(results: &RunResults) -> Option<Chart> {
             bound.position_sigma_m.get(after).map_or(f64::NAN, |sigma| sigma.norm() * per_m)
         };
         let limit = kept.clone().map(|k| at(best.stamps[k])).collect();
-        curves.push(curve("information bound (sigma)", CurveStyle::Limit, limit));
+        curves.push(curve("information bound in the world, known map (sigma)", CurveStyle::Limit, limit));
     }
     Some(chart("Position error after rigid alignment", format!("Error ({unit})"), t_s, curves))
 }

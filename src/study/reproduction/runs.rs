@@ -94,7 +94,7 @@ fn warned(spec: &RunsSpec, warning: &WarningSpec, sweep: &Sweep) -> Result<Compa
     Ok(ComparedNumber {
         figure: spec.figure.clone(),
         what: format!("{}, {}: runs wrong without warning", warning.what, warning.level),
-        paper: "a limit".to_owned(),
+        paper: "stated as a limitation".to_owned(),
         ours: statuses(&runs),
         comparison: Comparison::at_most("runs", None, 0.0, &[unwarned]),
     })

@@ -29,7 +29,7 @@ pub fn plan(world: &World, cut_m: f64) -> Figure {
     let edges = world.edges();
     let horizontal = SectionPlane { point_in_world: start + cut_m * Vector::z(), normal_in_world: -Vector::z() };
     let vertical = SectionPlane { point_in_world: start, normal_in_world: Vector::y() };
-    let title = format!("{}: floor plan, cut at a height of {:.1} m", world.name(), horizontal.point_in_world.z);
+    let title = format!("{}: floor plan, cut at z = {:.1} m", world.name(), horizontal.point_in_world.z);
     let floor_plan = Chart::new(&title, "x (m)", "y (m)");
     let title = format!("Elevation towards +y, cut at y = {:.1} m", start.y);
     let elevation = Chart::new(&title, "x (m)", "z (m)");

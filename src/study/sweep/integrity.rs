@@ -153,7 +153,7 @@ impl IntegrityReport {
         };
         let mut header = vec!["run".to_owned()];
         header.extend(self.axes.iter().cloned());
-        header.extend(["verdict", "error mm", "bound mm", "within %"].map(str::to_owned));
+        header.extend(["verdict", "error mm", "median bound mm", "within %"].map(str::to_owned));
         (
             format!("The {MAX_LISTED_RUNS} worst runs that are not lost"),
             header,

@@ -197,10 +197,14 @@ impl Measure {
     /// Key in files, short name for tables, axis label, display unit, and factor from the key's unit to the display unit.
     fn names(self) -> (&'static str, &'static str, &'static str, &'static str, f64) {
         match self {
-            Self::PositionRmseM => ("position_rmse_m", "position", "Position error, RMS (mm)", "mm", 1e3),
-            Self::RotationRmseDeg => ("rotation_rmse_deg", "rotation", "Rotation error, RMS (°)", "deg", 1.0),
-            Self::DriftMPerMin => ("drift_m_per_min", "drift", "Drift (mm/min)", "mm/min", 1e3),
-            Self::YawDriftDegPerMin => ("yaw_drift_deg_per_min", "yaw drift", "Yaw drift (°/min)", "deg/min", 1.0),
+            Self::PositionRmseM => ("position_rmse_m", "position", "Position error, open loop, RMS (mm)", "mm", 1e3),
+            Self::RotationRmseDeg => {
+                ("rotation_rmse_deg", "rotation", "Rotation error, open loop, RMS (°)", "deg", 1.0)
+            }
+            Self::DriftMPerMin => ("drift_m_per_min", "drift", "Drift, open loop (mm/min)", "mm/min", 1e3),
+            Self::YawDriftDegPerMin => {
+                ("yaw_drift_deg_per_min", "yaw drift", "Yaw drift, open loop (°/min)", "deg/min", 1.0)
+            }
             Self::ClockRmseS => ("clock_rmse_s", "clock", "Clock offset error, RMS (ms)", "ms", 1e3),
             Self::ClockError30S => ("clock_error_30s_s", "clock 30 s", "Clock offset error after 30 s (ms)", "ms", 1e3),
             Self::ClockError120S => {
@@ -212,20 +216,24 @@ impl Measure {
             Self::ClosedPositionRmseM => {
                 ("closed_position_rmse_m", "closed loop", "Position error, closed loop, RMS (mm)", "mm", 1e3)
             }
-            Self::ErrorOverSlamBound => ("error_over_slam_bound", "error/bound", "Closed loop over bound", "1", 1.0),
+            Self::ErrorOverSlamBound => {
+                ("error_over_slam_bound", "error/CRLB", "Closed-loop error over information bound", "1", 1.0)
+            }
             Self::Status => ("status", "status", "Verdict (0 good, 1 degraded, 2 lost)", "1", 1.0),
             Self::AlignedRmseM => {
                 ("aligned_rmse_m", "aligned", "Position error, aligned over the first 20 s, RMS (mm)", "mm", 1e3)
             }
             Self::LargestErrorM => ("largest_error_m", "largest", "Largest position error (mm)", "mm", 1e3),
-            Self::BoundM99 => ("bound_m_99", "bound", "Bound on the position error, 99 % (mm)", "mm", 1e3),
+            Self::BoundM99 => ("bound_m_99", "bound", "99 % bound on the position error, median (mm)", "mm", 1e3),
             Self::WithinBound => ("within_bound", "within", "Poses within their bound (%)", "%", 1e2),
-            Self::BoundOverError => ("bound_over_error", "bound/error", "Ratio of bound to error", "1", 1.0),
+            Self::BoundOverError => ("bound_over_error", "bound/error", "99 % bound over error, median", "1", 1.0),
             Self::WayM => ("way_m", "path", "Length of the path (m)", "m", 1.0),
             Self::DriftOverPath => ("drift_over_path", "drift/path", "Drift over the length of the path (%)", "%", 1e2),
             Self::CloudSigmaM => ("cloud_sigma_m", "cloud", "Standard deviation of the cloud (mm)", "mm", 1e3),
             Self::CloudBiasM => ("cloud_bias_m", "cloud bias", "Bias of the cloud (mm)", "mm", 1e3),
-            Self::CloudOverTruth => ("cloud_over_truth", "cloud/truth", "Deviation over that by the truth", "1", 1.0),
+            Self::CloudOverTruth => {
+                ("cloud_over_truth", "cloud/truth", "Cloud sigma over that with the true trajectory", "1", 1.0)
+            }
             Self::ReferenceSigmaM => {
                 ("reference_sigma_m", "from reference", "Standard deviation from the reference cloud (mm)", "mm", 1e3)
             }
@@ -237,8 +245,12 @@ impl Measure {
             Self::FractionSeen => ("fraction_seen", "coverage", "Observed fraction of the sphere (%)", "%", 1e2),
             Self::FractionSeen1S => ("fraction_seen_1s", "in 1 s", "Coverage in a second (%)", "%", 1e2),
             Self::CoveredS => ("covered_s", "cover time", "Time to 90 % of the coverage (s)", "s", 1.0),
-            Self::DensityPerSrS => ("density_per_sr_s", "density", "Beam density (1/sr/s)", "1/sr/s", 1.0),
-            Self::FieldOfViewDeg => ("field_of_view_deg", "view", "Field of view (°)", "deg", 1.0),
+            Self::DensityPerSrS => {
+                ("density_per_sr_s", "density", "Beam density, mean of the observed part (1/sr/s)", "1/sr/s", 1.0)
+            }
+            Self::FieldOfViewDeg => {
+                ("field_of_view_deg", "view", "Elevation range of the forward beam (°)", "deg", 1.0)
+            }
             Self::RateDegPerS => ("rate_deg_per_s", "rate", "Maximum rate (°/s)", "deg/s", 1.0),
             Self::RateP99DegPerS => ("rate_p99_deg_per_s", "rate 99 %", "Rate, 99 % quantile (°/s)", "deg/s", 1.0),
             Self::Saturated => ("saturated", "saturated", "Time with a saturated gyroscope (%)", "%", 1e2),
@@ -246,12 +258,16 @@ impl Measure {
             Self::CoilContactS => ("coil_contact_s", "contact", "Time with touching coils (s)", "s", 1.0),
             Self::RockingHz => ("rocking_hz", "rocking", "Rocking frequency (Hz)", "Hz", 1.0),
             Self::PeakGain => ("peak_gain", "gain", "Peak gain", "1", 1.0),
-            Self::SagMm => ("sag_mm", "sag", "Static compression (mm)", "mm", 1.0),
+            Self::SagMm => ("sag_mm", "sag", "Static compression, negative for extension (mm)", "mm", 1.0),
             Self::SpringMassG => ("spring_mass_g", "mass", "Mass of the spring (g)", "g", 1.0),
             Self::StressShare => ("stress_share", "stress", "Stress over yield strength (%)", "%", 1e2),
             Self::FatigueMargin => ("fatigue_margin", "fatigue", "Margin of fatigue", "1", 1.0),
-            Self::OpenLoopTimeRatio => ("open_loop_time_ratio", "loop time", "Open loop time (%)", "%", 1e2),
-            Self::ClosedLoopTimeRatio => ("closed_loop_time_ratio", "closure time", "Closure time (%)", "%", 1e2),
+            Self::OpenLoopTimeRatio => {
+                ("open_loop_time_ratio", "loop time", "Open-loop computing time over recording (%)", "%", 1e2)
+            }
+            Self::ClosedLoopTimeRatio => {
+                ("closed_loop_time_ratio", "closure time", "Loop-closure computing time over recording (%)", "%", 1e2)
+            }
             Self::WallS => ("wall_s", "time", "Computing time (s)", "s", 1.0),
         }
     }

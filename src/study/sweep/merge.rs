@@ -110,6 +110,15 @@ impl Sweep {
         Ok(columns.into_iter().flat_map(Column::numbers).collect())
     }
 
+    /// The error of the first failed run of a merged sweep, if one failed.
+    ///
+    /// # Errors
+    /// As [`read_merged`](Self::read_merged).
+    pub fn first_failure(&self) -> Result<Option<String>, StudyError> {
+        let columns = self.read_merged(&self.table(), &[("error", ColumnType::Text)])?;
+        Ok(columns.into_iter().flat_map(Column::texts).flatten().find(|error| !error.is_empty()))
+    }
+
     fn table_columns(&self) -> Vec<(String, ColumnType)> {
         let mut columns = vec![("point".to_owned(), ColumnType::Counts)];
         columns.extend(self.plan.setting_columns());

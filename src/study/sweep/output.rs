@@ -52,14 +52,13 @@ pub(super) fn text(summary: &Summary, plan: &Plan) -> String {
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         format!("{}{}\n", zsim_report::wrapped(&title, "  "), zsim_report::table(&header, &rows, true))
     });
-    tables.collect::<String>() + &zsim_report::wrapped(&legend(summary), "")
+    tables.collect::<String>() + &zsim_report::wrapped(&legend(summary, "Medians; quartiles are in study.md."), "")
 }
 
 /// The tables as Markdown, and again at each level of the axis `by`.
 pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::SweepStatus) -> String {
     let mut text = format!(
-        "# {}\n\nWritten by `zsim study {}`, version {}: {} runs, {} of them failed, {} missing.\n",
-        plan.name(),
+        "# {}\n\nWritten by zsim {}: {} runs, {} of them failed, {} missing.\n",
         plan.name(),
         env!("CARGO_PKG_VERSION"),
         status.points,
@@ -86,7 +85,7 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::SweepStat
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         text += &format!("\n{title}\n\n{}", zsim_report::markdown(&header, &rows));
     }
-    format!("{text}\n{}\n", legend(summary))
+    format!("{text}\n{}\n", legend(summary, "Medians (quartiles)."))
 }
 
 /// Measures per table on the terminal, each with its ratio; more are too wide.
@@ -194,14 +193,15 @@ pub(super) fn digits(x: f64) -> String {
     }
 }
 
-fn legend(summary: &Summary) -> String {
+/// Explains the figures of the tables; `medians` describes the cells of a table of levels.
+pub(super) fn legend(summary: &Summary, medians: &str) -> String {
     if !summary.trends.is_empty() {
         return format!(
             "Spearman's rank correlation, from -1 (falling) to 1 (rising). * p < {SIGNIFICANCE_LEVEL}, Holm-corrected over all axes."
         );
     }
     format!(
-        "Medians; quartiles are in study.md. Ratio: median over pairs of runs that differ only in this axis, to its first level. * p < \
+        "{medians} Ratio: median over pairs of runs that differ only in this axis, to its first level. * p < \
          {SIGNIFICANCE_LEVEL} in a two-sided Wilcoxon signed-rank test of the log ratios, Holm-corrected over all levels."
     )
 }

@@ -1,7 +1,7 @@
 //! The page of a merged sweep.
 
 use super::integrity::IntegrityReport;
-use super::output::{digits, heading, tables};
+use super::output::{digits, heading, legend, tables};
 use super::plots::PlotFile;
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
@@ -48,9 +48,11 @@ impl Sweep {
         Ok(StudyPage {
             name: self.plan.name().to_owned(),
             introduction: format!(
-                "{} runs, {} of them failed, {} missing. Medians with quartiles; a ratio is the median over pairs of runs that \
-                 differ only in this axis, to its first level.",
-                status.points, status.failed, status.missing
+                "{} runs, {} of them failed, {} missing. {}",
+                status.points,
+                status.failed,
+                status.missing,
+                legend(summary, "Medians (quartiles).")
             ),
             tables: tables.collect(),
             plots: self.page_plots(plots)?,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use zsim_base::random::Seed;
 use zsim_base::spec::{self, Named, NamedSpec, Source, SpecError, name_from, to_json};
-use zsim_dynamics::HeadSpec;
+use zsim_dynamics::{HeadSpec, LinkageSpec};
 use zsim_estimation::EstimatorSpec;
 use zsim_motion::MotionSpec;
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
@@ -208,7 +208,16 @@ impl Tree {
     /// # Errors
     /// A message if a value is invalid.
     pub fn gain_run(&self) -> Result<GainRun, String> {
-        read(self.0.clone())
+        let inputs: GainRun = read(self.0.clone())?;
+        if inputs.gains.realisations < 2 {
+            return Err("`realisations` must be at least 2".to_owned());
+        }
+        match inputs.head.spec.linkage {
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => {
+                Err(format!("the head {} has no spring, so it has no gains", inputs.head.name))
+            }
+            LinkageSpec::Spring { .. } | LinkageSpec::Suspension { .. } => Ok(inputs),
+        }
     }
 
     /// Checks that the values are valid for a base run.

@@ -85,5 +85,5 @@ fn duplicates_are_used_once() {
     assert_eq!(all.len(), 100 + 10);
     let loss = measurements.loss();
     assert_eq!((loss.repeated_samples, loss.repeated_scans, loss.is_none()), (50, 20, true));
-    assert_eq!(loss.notes(), ["20 duplicate scans were ignored", "50 duplicate IMU samples were ignored"]);
+    assert_eq!(loss.notes(), ["duplicate scans ignored: 20", "duplicate IMU samples ignored: 50"]);
 }

@@ -59,7 +59,7 @@ const channels = (() => {
   const time = shorts(cloud.time);
   known.time = { name: "time", unit: "s", scale: "sequential", lower: 0, upper: cloud.duration };
   known.time.codes = Uint8Array.from(time, (code) => Math.round((code / 65535) * 254));
-  add("turn_rate", "rotational velocity", "\u00b0/s", "sequential");
+  add("turn_rate", "angular velocity", "\u00b0/s", "sequential");
   add("intensity", "intensity", "", "sequential");
   const material = bytes(cloud.material);
   if (material.some((code) => code !== 255)) {
