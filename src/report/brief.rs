@@ -32,7 +32,7 @@ fn accuracy(metrics: &Metrics) -> String {
 
 fn times(metrics: &Metrics) -> String {
     let of_acquisition = metrics.open_loop.fraction_of_acquisition;
-    let fraction = of_acquisition.map_or_else(String::new, |f| format!(" ({} of the recording)", percent(f)));
+    let fraction = of_acquisition.map_or_else(String::new, |f| format!(" ({} of run)", percent(f)));
     let parts = [
         metrics.simulation.wall_s.map(|s| format!("simulation {}", time(s))),
         metrics.open_loop.wall_s.map(|s| format!("open loop {}{fraction}", time(s))),
@@ -66,6 +66,6 @@ mod tests {
         assert_eq!(lines[0], "office, 20.0 s");
         assert!(lines[1].starts_with("verdict: good"), "{text}");
         assert_eq!(lines[2], "accuracy: open loop 4.10 mm, closed loop 3.00 mm and 0.0500\u{b0} (RMSE)");
-        assert_eq!(lines[3], "time: open loop 2.00 s (10.0 % of the recording)");
+        assert_eq!(lines[3], "time: open loop 2.00 s (10.0 % of run)");
     }
 }
