@@ -97,7 +97,7 @@ pub(super) fn design(study: &DesignStudy) -> String {
 /// The table of the journeys; empty without any.
 fn journeys(study: &DesignStudy) -> String {
     let measures: Vec<Measure> =
-        study.journey_measures().into_iter().filter(|measure| *measure != Measure::CoilContactS).collect();
+        study.journey_measures().into_iter().filter(|measure| *measure != Measure::COIL_CONTACT_S).collect();
     if measures.is_empty() {
         return String::new();
     }

@@ -138,6 +138,10 @@ pub struct ClockMetrics {
     pub offset_rmse_s: Option<f64>,
     /// Estimated minus true offset at the end of the run, s.
     pub offset_end_error_s: Option<f64>,
+    /// Absolute error of the offset 30 s after the first estimate, s.
+    pub error_after_30s_s: Option<f64>,
+    /// The same after 120 s.
+    pub error_after_120s_s: Option<f64>,
 }
 
 /// Estimated corrections of the lidar calibration at the end of the run, along the IMU axes.

@@ -10,7 +10,8 @@ use zsim_base::measurement::LidarCorrection;
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::EstimatorSpec;
 use zsim_evaluation::{
-    Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, consistency, drift, relative_error,
+    Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, clock_error_after, consistency,
+    drift, relative_error,
 };
 use zsim_report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
 use zsim_simulation::SimulationSummary;
@@ -153,10 +154,14 @@ pub(super) fn imu_only(run: &OpenLoopRun, truth: &SampledTruth, watch: &mut Prog
 /// Metrics of the clock offset.
 pub(super) fn clock_metrics(run: &OpenLoopRun, truth: Option<&SampledTruth>) -> ClockMetrics {
     let error = truth.and_then(|truth| clock_error(&run.clock_offsets, &truth.clock_offsets));
+    let error_after =
+        |after_s| truth.and_then(|truth| clock_error_after(&run.clock_offsets, &truth.clock_offsets, after_s));
     ClockMetrics {
         offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),
         offset_rmse_s: error.map(|error| error.offset_rmse_s),
         offset_end_error_s: error.map(|error| error.offset_end_error_s),
+        error_after_30s_s: error_after(30.0),
+        error_after_120s_s: error_after(120.0),
     }
 }
 

@@ -133,7 +133,7 @@ pub(super) fn estimate_in(
     let pairs = truth.map(|truth| Pairs::of(best.map_from_head, &truth.heads));
     let metrics = Metrics {
         status: Some(integrity.status().name().to_owned()),
-        integrity: integrity.metrics(run, pairs.as_ref()),
+        integrity: integrity.metrics(run, best.map_from_head, pairs.as_ref()),
         sensors: models.metrics(),
         losses: run.events.losses.clone(),
         notes: run.events.notes.clone(),

@@ -196,8 +196,8 @@ impl Integrity {
         Some(Errors::after(pairs, &world_from_map))
     }
 
-    /// The metrics for `metrics.json`; `pairs` are the estimated and true poses, if the truth is known.
-    pub fn metrics(&self, run: &OpenLoopRun, pairs: Option<&Pairs>) -> IntegrityMetrics {
+    /// The metrics of the result `trajectory` for `metrics.json`; `pairs` are the estimated and true poses, if the truth is known.
+    pub fn metrics(&self, run: &OpenLoopRun, trajectory: &Trajectory, pairs: Option<&Pairs>) -> IntegrityMetrics {
         let since = |stamp: Stamp| stamp.seconds_since(run.recorded.0);
         let cause = |finding: &Finding| CauseMetrics {
             status: finding.status.name().to_owned(),
@@ -219,6 +219,7 @@ impl Integrity {
             bound_over_error: check.and_then(|check| finite(check.bound_over_error)),
             aligned_rmse_m: check.map(|check| check.rmse_m),
             largest_error_m: check.map(|check| check.largest_m),
+            path_length_m: Some(path_length_m(trajectory)),
         }
     }
 
@@ -277,7 +278,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// Path length of the head, m, from positions at 1 s intervals, so that the swing on the spring does not count.
-pub(super) fn path_length_m(trajectory: &Trajectory) -> f64 {
+fn path_length_m(trajectory: &Trajectory) -> f64 {
     let mut last: Option<(Stamp, Vector)> = None;
     let mut path_m = 0.0;
     for (stamp, pose) in trajectory.iter() {

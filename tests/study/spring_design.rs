@@ -160,9 +160,9 @@ fn springs_are_compared_by_their_journeys() {
             let swing = coverage(simulation.head(), simulation.motion(), simulation.lidar(), &plan, |_| ()).unwrap();
             1.0 - swing.gyro.most_deg_per_s / 600.0
         };
-        let left = design.journey[&Measure::GyroRangeLeft];
+        let left = design.journey[&Measure::named("gyro_range_left")];
         assert!((left - 0.5 * (range_left(1) + range_left(2))).abs() < 1e-12, "{left}");
-        let error_m = design.journey[&Measure::PositionRmseM];
+        let error_m = design.journey[&Measure::named("position_rmse_m")];
         assert!(error_m > 0.0 && error_m < 0.02, "{error_m}");
     }
     let header = csv(&study).lines().next().unwrap().to_owned();
@@ -174,7 +174,7 @@ fn a_limit_of_the_journey_rejects_springs_and_a_goal_without_a_journey_is_an_err
     let goals = "(measure: fraction_seen_1s, aim: most)";
     let open = by_outcome(goals, "").unwrap();
     let best = open.candidates.first().unwrap();
-    let (name, most) = (&best.candidate.coil.name, best.journey[&Measure::FractionSeen1S]);
+    let (name, most) = (&best.candidate.coil.name, best.journey[&Measure::named("fraction_seen_1s")]);
     // A limit below the best spring's coverage rejects it, with its value.
     let limited = by_outcome(goals, &format!("(measure: fraction_seen_1s, most: {})", 0.999 * most)).unwrap();
     let rejection = limited.rejections.iter().find(|rejection| rejection.coil.name == *name).unwrap();
@@ -197,7 +197,7 @@ fn an_invalid_search_is_an_error_with_the_reason() {
     };
     assert!(wrong(|s| s.goals.clear()).contains("at least one goal"));
     assert!(wrong(|s| s.shake.frequency_hz = Some(0.0)).contains("expected a finite number above 0"));
-    let no_journey = wrong(|s| s.goals[0].measure = Measure::PositionRmseM);
+    let no_journey = wrong(|s| s.goals[0].measure = Measure::named("position_rmse_m"));
     assert!(no_journey.contains("add `journey:"), "{no_journey}");
     assert!(wrong(|s| s.head = "rigid".to_owned()).contains("no spring"));
     assert!(wrong(|s| s.head = "nowhere".to_owned()).contains("no such head"));

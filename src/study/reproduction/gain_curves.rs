@@ -78,7 +78,7 @@ fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent) -> Result<Pl
         axes: vec![axis("head", letters), axis("gains.axis", axes)],
         sampling: Sampling::Grid,
         seeds: Vec::new(),
-        measures: vec![Measure::PeakGain],
+        measures: vec![Measure::PEAK_GAIN],
         by: None,
         front: Vec::new(),
         limits: Vec::new(),

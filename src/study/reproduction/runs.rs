@@ -145,7 +145,8 @@ mod tests {
 
     #[test]
     fn a_ratio_has_no_unit() {
-        let ratio = Comparison::at_most(display_unit(Measure::CloudOverTruth).0, None, 1.02, &[1.0, 1.01]).unwrap();
+        let ratio =
+            Comparison::at_most(display_unit(Measure::named("cloud_over_truth")).0, None, 1.02, &[1.0, 1.01]).unwrap();
         assert_eq!((in_words(&ratio, 2).as_str(), ratio.goal.as_str()), ("1.00, worst 1.01 of 2 runs", "at most 1.02"));
     }
 }

@@ -116,7 +116,8 @@ pub struct WarningSpec {
 
 impl WarningSpec {
     /// Measures that it needs.
-    pub(super) const MEASURES: [Measure; 3] = [Measure::Status, Measure::AlignedRmseM, Measure::WayM];
+    pub(super) const MEASURES: [Measure; 3] =
+        [Measure::STATUS, Measure::named("aligned_rmse_m"), Measure::named("way_m")];
 }
 
 /// Gain curves of several heads.
@@ -263,8 +264,8 @@ impl RunsSpec {
                 return wrong("results", format!("the study \"{}\" does not measure {}", self.study, measure.key()));
             }
         }
-        if self.plots_clock && !spec.measures.contains(&Measure::ClockError30S) {
-            let key = Measure::ClockError30S.key();
+        if self.plots_clock && !spec.measures.contains(&Measure::CLOCK_ERROR_30S_S) {
+            let key = Measure::CLOCK_ERROR_30S_S.key();
             return wrong("plots_clock", format!("the study \"{}\" does not measure {key}", self.study));
         }
         if extent == Extent::Quick {

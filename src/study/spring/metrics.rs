@@ -5,7 +5,7 @@ use super::margins::{LoadRecord, SpringMargins};
 use super::model::SpringModel;
 use crate::StudyError;
 use crate::coverage::{Coverage, CoveragePlan, coverage};
-use crate::sweep::Measure;
+use crate::sweep::{Measure, Results};
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -44,17 +44,7 @@ pub struct DesignMetrics {
 impl DesignMetrics {
     /// A measure; `None` if it is not known, or has no closed form.
     pub fn figure(&self, measure: Measure) -> Option<f64> {
-        match measure {
-            Measure::RockingHz => Some(self.rocking_hz),
-            Measure::PeakGain => Some(self.peak_gain),
-            Measure::SagMm => self.sag_mm,
-            Measure::SpringMassG => self.spring_mass_g,
-            Measure::FieldOfViewDeg => Some(self.field_of_view_deg),
-            Measure::RateDegPerS => Some(self.rate_deg_per_s),
-            Measure::StressShare => self.stress_share,
-            Measure::FatigueMargin => self.fatigue_margin,
-            _ => None,
-        }
+        measure.of(&Results { head: Some(*self), ..Results::default() })
     }
 
     /// The figure for goals and limits: infinite if it is not known.

@@ -41,7 +41,7 @@ pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> 
     }
     if let Some(measure) = spec.measures.iter().find(|measure| !measure.is_available_for(&spec.base)) {
         let has: Vec<&str> =
-            Measure::ALL.into_iter().filter(|measure| measure.is_available_for(&spec.base)).map(Measure::key).collect();
+            Measure::all().filter(|measure| measure.is_available_for(&spec.base)).map(Measure::key).collect();
         let message = format!("the run in `base` does not measure {}; it measures {}", measure.key(), has.join(", "));
         return Err(about(measure.key(), message));
     }
@@ -100,7 +100,7 @@ fn check_sizes(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
 fn check_table_names(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
     let names: Vec<&str> = spec.axes.iter().map(AxisSpec::name).collect();
     let reserved: Vec<&str> =
-        ["point", "seed", "error", "id"].into_iter().chain(Measure::ALL.map(Measure::key)).collect();
+        ["point", "seed", "error", "id"].into_iter().chain(Measure::all().map(Measure::key)).collect();
     for (k, axis) in spec.axes.iter().enumerate() {
         let about = |message: String| Err(SpecError::about(source, axis.anchor().trim_matches('"'), message));
         let name = axis.name();

@@ -38,7 +38,7 @@ fn curve(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
         high: scale.at(line.three_quarters),
     };
     let band = lines.iter().map(quartiles).filter(|at| at.low.is_finite() && at.high.is_finite()).collect();
-    Chart::new("", &axis_label(axis), measure.label())
+    Chart::new("", &axis_label(axis), &measure.label())
         .with(Series::line("", Colour::Estimate, medians).with_band(band))
         .with_y_ticks(scale.ticks())
 }
@@ -54,7 +54,7 @@ fn rows(axis: &str, measure: Measure, lines: &[&LevelSummary]) -> Chart {
     let dots = lines.iter().enumerate().map(|(k, line)| (scale.at(line.median), height(k)));
     let ticks = lines.iter().enumerate().map(|(k, line)| Tick { at: height(k), label: line.level.clone() });
     let room = room_for_rows(scale.ends(), lines.len());
-    Chart::new(&format!("By {}", quantity_name(axis)), measure.label(), "")
+    Chart::new(&format!("By {}", quantity_name(axis)), &measure.label(), "")
         .with(room)
         .with(Series::line("", Colour::Backdrop, bars.collect()).marked(Mark::Line(4.0)))
         .with(Series::dots("", Colour::Estimate, dots.collect()).marked(Mark::Dots(6.0)))

@@ -1,6 +1,7 @@
 //! Runs that are evaluated in this process: closed forms, and gains of a head.
 
 use super::part::RunOutcome;
+use super::results::Results;
 use super::tree::{ClosedForm, GainRun};
 use super::{BaseSpec, Measure, Plan};
 use crate::StudyError;
@@ -24,8 +25,8 @@ pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutc
 fn metrics(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, StudyError> {
     let inputs = plan.inputs(index)?.closed_form();
     let ClosedForm { shake, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
-    let of = closed_form(&head.spec, &head.source(), &shake, MISSION_HOURS)?;
-    Ok(RunOutcome { figures: measures.iter().map(|measure| of.figure(*measure)).collect(), ..RunOutcome::default() })
+    let head = Some(closed_form(&head.spec, &head.source(), &shake, MISSION_HOURS)?);
+    Ok(RunOutcome { figures: Results { head, ..Results::default() }.figures(measures), ..RunOutcome::default() })
 }
 
 /// Measures a gain curve, which is the detail of the run.
@@ -34,7 +35,7 @@ fn gains(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, St
     let GainRun { gains, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
     let head = HeadModel::new(&head.spec, &head.source())?;
     let curve = gain_curve(&head, gains.axis, &gains.plan(), GainWatch::silent())?;
-    let figure = |measure: &Measure| curve.peak.filter(|_| *measure == Measure::PeakGain).map(|peak| peak.gain);
-    let figures = measures.iter().map(figure).collect();
+    let peak_gain = curve.peak.map(|peak| peak.gain);
+    let figures = Results { peak_gain, ..Results::default() }.figures(measures);
     Ok(RunOutcome { figures, details: Some(spec::to_text(&curve)?), ..RunOutcome::default() })
 }

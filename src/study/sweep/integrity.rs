@@ -40,6 +40,16 @@ impl RunIntegrity {
     }
 }
 
+/// The measures of which the statements consist.
+const MEASURES: [Measure; 6] = [
+    Measure::STATUS,
+    Measure::named("aligned_rmse_m"),
+    Measure::named("within_bound"),
+    Measure::named("bound_over_error"),
+    Measure::named("bound_m_99"),
+    Measure::named("way_m"),
+];
+
 /// Integrity statements of all runs of a sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct IntegrityReport {
@@ -50,25 +60,17 @@ pub(super) struct IntegrityReport {
 impl Sweep {
     /// Integrity statements of the runs in the merged table; `None` if the sweep does not measure them.
     pub(super) fn integrity_report(&self) -> Result<Option<IntegrityReport>, StudyError> {
-        let measures = [
-            Measure::Status,
-            Measure::AlignedRmseM,
-            Measure::WithinBound,
-            Measure::BoundOverError,
-            Measure::BoundM99,
-            Measure::WayM,
-        ];
-        if !measures.iter().all(|measure| self.plan.spec().measures.contains(measure)) {
+        if !MEASURES.iter().all(|measure| self.plan.spec().measures.contains(measure)) {
             return Ok(None);
         }
         let axes = text_axes(&self.plan);
         let mut columns = vec![("point", ColumnType::Counts)];
-        columns.extend(measures.iter().map(|measure| (measure.key(), ColumnType::Numbers)));
+        columns.extend(MEASURES.iter().map(|measure| (measure.key(), ColumnType::Numbers)));
         columns.extend(axes.iter().map(|axis| (axis.as_str(), ColumnType::Text)));
         let mut columns = self.read_merged(&self.table(), &columns)?.into_iter();
         let numbers = columns.next().map_or_else(Vec::new, Column::counts);
         let filled = |column: Column| column.numbers().into_iter().map(|cell| cell.unwrap_or(f64::NAN)).collect();
-        let figures: Vec<Vec<f64>> = columns.by_ref().take(measures.len()).map(filled).collect();
+        let figures: Vec<Vec<f64>> = columns.by_ref().take(MEASURES.len()).map(filled).collect();
         let texts: Vec<Vec<Option<String>>> = columns.map(Column::texts).collect();
         let faults = axes.iter().position(|axis| axis == FAULT_AXIS.0);
         let run = |(row, number): (usize, Option<i64>)| {

@@ -69,7 +69,7 @@ fn map(plan: &Plan, runs: &Runs, figures: &[f64], x: usize, y: usize, measure: M
     };
     // The title has the unit.
     let cells = Cells::with_robust_range("", medians.iter().enumerate().map(cell).collect());
-    let chart = Chart::new(measure.label(), &axis_label(&plan.axes()[x].name), &axis_label(&plan.axes()[y].name))
+    let chart = Chart::new(&measure.label(), &axis_label(&plan.axes()[x].name), &axis_label(&plan.axes()[y].name))
         .with_cells(cells);
     let chart = if plan.axes()[x].is_number() { chart } else { chart.with_x_ticks(level_ticks(plan, x)) };
     if plan.axes()[y].is_number() { chart } else { chart.with_y_ticks(level_ticks(plan, y)) }

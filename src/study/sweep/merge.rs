@@ -150,7 +150,7 @@ fn table_schema(columns: &[(String, ColumnType)]) -> Result<String, StudyError> 
         if let Some(unit) = split_unit(name).1.filter(|_| *column_type == ColumnType::Numbers) {
             field["unit"] = unit.into();
         }
-        if let Some(measure) = Measure::ALL.into_iter().find(|measure| measure.key() == name) {
+        if let Some(measure) = Measure::all().find(|measure| measure.key() == name) {
             field["description"] = measure.quantity().into();
         }
         field

@@ -118,7 +118,7 @@ impl Sweep {
         let before = columns.len();
         for measure in measures {
             let values = pick(&self.figures(*measure)?, measure.unit().1);
-            columns.push(PointColumn { label: measure.label().to_owned(), values });
+            columns.push(PointColumn { label: measure.label(), values });
         }
         let goals = self.plan.spec().front.iter().map(|goal| goal.measure);
         let place = |measure| measures.iter().position(|other| *other == measure).map(|place| before + place);

@@ -133,8 +133,8 @@ impl Plan {
 
     /// The measures in the table of computing times: that of the run first, then those of the study.
     pub(super) fn time_measures(&self) -> Vec<Measure> {
-        let others = self.spec.measures.iter().copied().filter(|of| of.is_time() && *of != Measure::WallS);
-        std::iter::once(Measure::WallS).chain(others).collect()
+        let others = self.spec.measures.iter().copied().filter(|of| of.is_time() && *of != Measure::WALL_S);
+        std::iter::once(Measure::WALL_S).chain(others).collect()
     }
 
     /// Time and memory limits of a run; `None` for closed forms.

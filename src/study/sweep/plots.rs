@@ -137,7 +137,7 @@ fn front_figure((x, y): (Measure, Measure), all: &[(f64, f64)], front: &[(f64, f
         far => format!("runs ({far} are outside the axes)"),
     };
     let every = near.len().div_ceil(MAX_DOTS).max(1);
-    let chart = Chart::new("Pareto front", x.label(), y.label())
+    let chart = Chart::new("Pareto front", &x.label(), &y.label())
         .with(Series::dots(&name, Colour::Backdrop, near.into_iter().step_by(every).collect()).marked(Mark::Dots(2.0)))
         .with(Series::dots("front", Colour::Estimate, front.to_vec()).marked(Mark::Dots(4.5)));
     let mut figure = Figure::of(vec![chart]);

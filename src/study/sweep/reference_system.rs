@@ -1,7 +1,7 @@
 //! A reference system: a second simulated system in the scene of a run, whose map the map of the run is compared with.
 
-use super::Measure;
 use super::reference_inputs::ReferenceInputs;
+use super::results::{ReferenceResults, Results};
 use super::run_recording::{Estimates, RunRecording};
 use super::tree::Journey;
 use crate::cloud::Surroundings;
@@ -144,16 +144,17 @@ impl CloudComparison {
         })
     }
 
-    pub(super) fn figure(&self, measure: Measure) -> Option<f64> {
+    /// Adds the comparison to the results of the run.
+    pub(super) fn add_to(&self, results: &mut Results) {
         let sigma_m = |of: Option<CloudSummary>| of.map(|summary| summary.sigma_m);
-        match measure {
-            Measure::CloudSigmaM => sigma_m(self.to_truth),
-            Measure::CloudBiasM => self.to_truth.map(|summary| summary.bias_m),
-            Measure::CloudOverTruth => sigma_m(self.to_truth).zip(sigma_m(self.by_truth)).map(|(of, by)| of / by),
-            Measure::ReferenceSigmaM => sigma_m(self.to_reference),
-            Measure::ReferenceBiasM => self.to_reference.map(|summary| summary.bias_m),
-            Measure::ReferenceRmseM => self.reference_rmse_m,
-            _ => None,
-        }
+        let bias_m = |of: Option<CloudSummary>| of.map(|summary| summary.bias_m);
+        let cloud = &mut results.metrics.cloud;
+        (cloud.sigma_m, cloud.bias_m) = (sigma_m(self.to_truth), bias_m(self.to_truth));
+        cloud.sigma_by_truth_m = sigma_m(self.by_truth);
+        results.reference = ReferenceResults {
+            sigma_m: sigma_m(self.to_reference),
+            bias_m: bias_m(self.to_reference),
+            rmse_m: self.reference_rmse_m,
+        };
     }
 }

@@ -1,14 +1,15 @@
 //! Runs that are simulated, recorded and estimated.
 
 use super::Measure;
-use super::estimated_run::{EstimateMetrics, RunInputs, estimate};
-use super::measure::Origin;
+use super::estimated_run::{RunInputs, estimate};
+use super::measure::Needs;
 use super::part::RunOutcome;
 use super::reference_inputs::ReferenceInputs;
 use super::reference_system::ReferenceMap;
+use super::results::{Results, Swing};
 use super::tree::Journey;
 use super::{LimitSpec, Plan, timing};
-use crate::coverage::{Coverage, CoveragePlan, coverage};
+use crate::coverage::{CoveragePlan, coverage};
 use crate::latency::{MapErrors, Reference, TimingRun, TimingSpec};
 use crate::record::{description, record_together};
 use crate::{ProgressMonitor, StudyError, information_bound};
@@ -96,11 +97,10 @@ impl TemporaryRecording {
         run: &Journey,
         reader: usize,
     ) -> Result<Compared, StudyError> {
-        let needs_bound = measures.contains(&Measure::ErrorOverSlamBound);
-        let needs_reference = measures.iter().any(|measure| measure.origin() == Origin::Reference);
-        let reference = run.reference.as_ref().filter(|_| needs_reference);
+        let any = |needs: Needs| measures.iter().any(|measure| measure.needs() == needs);
+        let reference = run.reference.as_ref().filter(|_| any(Needs::Reference));
         Ok(Compared {
-            slam_bound_m: if needs_bound { self.slam_bound_m(limit, reader)? } else { None },
+            slam_bound_m: if any(Needs::SlamBound) { self.slam_bound_m(limit, reader)? } else { None },
             reference: reference.map(|inputs| self.reference_map(limit, inputs, run)).transpose()?,
         })
     }
@@ -115,18 +115,13 @@ impl TemporaryRecording {
         compared: &Compared,
     ) -> Result<RunOutcome, StudyError> {
         let measures = &plan.spec().measures;
-        let results = self.results(measures, limit, run, reader, compared)?;
-        let has_curve = measures.iter().any(|measure| measure.has_clock_curve());
-        let estimated = results.estimated.as_ref().filter(|_| has_curve);
-        let curve = estimated.and_then(|estimated| estimated.clock_curve.as_ref());
-        let map_errors = results.map_errors.as_ref();
-        let details = map_errors.map(spec::to_text).or_else(|| curve.map(spec::to_text)).transpose()?;
-        let figures = plan.result_measures().iter().map(|measure| results.figure(*measure)).collect();
-        let times = plan.time_measures().iter().skip(1).map(|measure| results.figure(*measure)).collect();
+        let (results, details) = self.results(measures, limit, run, reader, compared)?;
+        let figures = results.figures(&plan.result_measures());
+        let times = results.figures(&plan.time_measures()[1..]);
         Ok(RunOutcome { figures, times, details, ..RunOutcome::default() })
     }
 
-    /// Computes what `measures` need.
+    /// Computes what `measures` need: the results, and the details of the run as RON, if it has any.
     fn results(
         &self,
         measures: &[Measure],
@@ -134,32 +129,31 @@ impl TemporaryRecording {
         run: &Journey,
         reader: usize,
         compared: &Compared,
-    ) -> Result<JourneyResults, StudyError> {
+    ) -> Result<(Results, Option<String>), StudyError> {
         let any = |of: fn(Measure) -> bool| measures.iter().any(|measure| of(*measure));
-        let swings = any(|measure| matches!(measure.origin(), Origin::Swing | Origin::SwingOrClosedForm));
+        let swings = any(|measure| matches!(measure.needs(), Needs::Swing | Needs::SwingOrHead));
         let swing = swings.then(|| self.swing()).transpose()?;
-        let mut results = JourneyResults { swing, estimated: None, map_errors: None };
-        let Some(handle) = self.handles.get(reader).filter(|_| any(|measure| measure.origin().is_estimate())) else {
-            return Ok(results);
+        let Some(handle) = self.handles.get(reader).filter(|_| any(Measure::is_of_estimate)) else {
+            return Ok((Results { swing, ..Results::default() }, None));
         };
         let file = handle.try_clone().map_err(StudyError::file(&std::env::temp_dir()))?;
         if let Some(timing) = &run.timing {
             let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
-            results.map_errors = Some(with_time_limit(limit, work)?);
-        } else {
-            let clouds =
-                |measure: Measure| matches!(measure.origin(), Origin::AnyMap | Origin::Cloud | Origin::Reference);
-            let inputs = RunInputs {
-                simulation: &self.simulation,
-                journey: run,
-                closes_loops: any(Measure::needs_closed_loop),
-                slam_bound_m: compared.slam_bound_m,
-                compares_clouds: any(clouds),
-                reference: compared.reference.as_deref(),
-            };
-            results.estimated = Some(with_time_limit(limit, |stop| estimate(file, &inputs, stop))?);
+            let errors = with_time_limit(limit, work)?;
+            let results = Results { metrics: timing::metrics(&errors), swing, ..Results::default() };
+            return Ok((results, Some(spec::to_text(&errors)?)));
         }
-        Ok(results)
+        let inputs = RunInputs {
+            simulation: &self.simulation,
+            journey: run,
+            closes_loops: any(Measure::needs_closed_loop),
+            slam_bound_m: compared.slam_bound_m,
+            compares_clouds: any(|measure| matches!(measure.needs(), Needs::Cloud | Needs::Reference)),
+            reference: compared.reference.as_deref(),
+        };
+        let (results, curve) = with_time_limit(limit, |stop| estimate(file, &inputs, stop))?;
+        let curve = curve.filter(|_| any(|measure| measure.needs() == Needs::ClockCurve));
+        Ok((Results { swing, ..results }, curve.as_ref().map(spec::to_text).transpose()?))
     }
 
     /// Estimates with timing errors on one thread, and evaluates the result.
@@ -268,30 +262,15 @@ pub(crate) fn journey_figures(
     measures: &[Measure],
     limit: LimitSpec,
 ) -> Result<Vec<Option<f64>>, StudyError> {
-    let recorded = measures.iter().any(|measure| measure.origin().is_estimate());
+    let recorded = measures.iter().any(|measure| measure.is_of_estimate());
     let simulation = Simulation::build(journey.simulation.clone())?;
     let mut figures = Vec::new();
     for recording in record_simulations(vec![simulation], recorded, 1, limit)? {
         let compared = recording.compared_with(limit, measures, journey, 0)?;
-        let results = recording.results(measures, limit, journey, 0, &compared)?;
-        figures.extend(measures.iter().map(|measure| results.figure(*measure)));
+        let (results, _) = recording.results(measures, limit, journey, 0, &compared)?;
+        figures.extend(results.figures(measures));
     }
     Ok(figures)
-}
-
-/// What was computed for the measures of a journey.
-struct JourneyResults {
-    swing: Option<Swing>,
-    estimated: Option<EstimateMetrics>,
-    map_errors: Option<MapErrors>,
-}
-
-impl JourneyResults {
-    fn figure(&self, measure: Measure) -> Option<f64> {
-        let by_swing = self.swing.as_ref().and_then(|swing| swing_figure(measure, swing));
-        let by_map = || self.map_errors.as_ref().and_then(|errors| timing::figure(errors, measure));
-        by_swing.or_else(by_map).or_else(|| self.estimated.as_ref().and_then(|estimated| estimated.figure(measure)))
-    }
 }
 
 /// What a run is compared with.
@@ -299,29 +278,6 @@ struct Compared {
     /// Information bound with an unknown map, m.
     slam_bound_m: Option<f64>,
     reference: Option<Arc<ReferenceMap>>,
-}
-
-/// The swing of the head without rays.
-struct Swing {
-    /// Coverage of the lidar and use of the gyroscope's range.
-    coverage: Coverage,
-    coil_contact_s: f64,
-}
-
-fn swing_figure(measure: Measure, Swing { coverage, coil_contact_s }: &Swing) -> Option<f64> {
-    match measure {
-        Measure::FractionSeen => Some(coverage.fraction_seen),
-        Measure::FractionSeen1S => coverage.fraction_in_1s,
-        Measure::CoveredS => Some(coverage.covered_s),
-        Measure::DensityPerSrS => Some(coverage.density_per_sr_s.mean),
-        Measure::FieldOfViewDeg => Some(coverage.field_of_view_deg),
-        Measure::RateDegPerS => Some(coverage.gyro.most_deg_per_s),
-        Measure::RateP99DegPerS => Some(coverage.gyro.p99_deg_per_s),
-        Measure::Saturated => Some(coverage.gyro.saturated),
-        Measure::GyroRangeLeft => Some(coverage.gyro.range_left()),
-        Measure::CoilContactS => Some(*coil_contact_s),
-        _ => None,
-    }
 }
 
 /// Does `work`, and sets its stop flag when the time limit is exceeded.

@@ -146,10 +146,10 @@ impl Sweep {
         Ok(summary)
     }
 
-    /// A measure of all rows of the merged table; missing figures are [`Measure::missing_value`].
+    /// A measure of all rows of the merged table; a missing figure is infinite for a lost estimate, else NaN.
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
-        let cells = self.read_measure(measure)?;
-        Ok(cells.into_iter().map(|cell| cell.unwrap_or(measure.missing_value())).collect())
+        let missing = if measure.is_of_estimate() { f64::INFINITY } else { f64::NAN };
+        Ok(self.read_measure(measure)?.into_iter().map(|cell| cell.unwrap_or(missing)).collect())
     }
 }
 
@@ -219,7 +219,7 @@ fn line(rows: &[usize], figures: &[f64], firsts: Option<&[Option<usize>]>) -> Le
         level: String::new(),
         value: None,
         within: None,
-        measure: Measure::WallS,
+        measure: Measure::WALL_S,
         runs: rows.len(),
         lost: rows.len() - sorted_figures.iter().filter(|figure| figure.is_finite()).count(),
         median: quantile(&sorted_figures, 0.5),

@@ -121,7 +121,7 @@ impl Sweep {
     ) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
         let measures = self.plan.result_measures();
-        let recorded = measures.iter().any(|measure| measure.origin().is_estimate());
+        let recorded = measures.iter().any(|measure| measure.is_of_estimate());
         let mut simulations: Vec<Simulation> = Vec::new();
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {

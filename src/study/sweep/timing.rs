@@ -1,23 +1,22 @@
 //! Runs with timing errors: their measures, and the latency study that they make up.
 
 use super::bootstrap::pooled;
-use super::{BaseSpec, Journey, Measure, Sweep};
+use super::{BaseSpec, Journey, Sweep};
 use crate::StudyError;
 use crate::atomic_file::write_text;
 use crate::latency::{ClockState, LatencyResult, MapErrors, csv, curve_figure, map_figure};
 use zsim_base::files::subfolder;
+use zsim_report::Metrics;
 
-/// A measure of a run with timing errors.
-pub(super) fn figure(errors: &MapErrors, measure: Measure) -> Option<f64> {
+/// The results of a run with timing errors.
+pub(super) fn metrics(errors: &MapErrors) -> Metrics {
     let sum = pooled(&errors.blocks);
-    let figure = match measure {
-        Measure::PositionRmseM => sum.position_variance_m2().sqrt(),
-        Measure::CloudSigmaM => sum.cloud_variance_m2().sqrt(),
-        Measure::CloudBiasM => sum.cloud_bias_m(),
-        Measure::ClockErrorS => errors.clock_error_ms * 1e-3,
-        _ => return None,
-    };
-    Some(figure).filter(|figure| figure.is_finite())
+    let mut metrics = Metrics::default();
+    metrics.open_loop.position_rmse_m = Some(sum.position_variance_m2().sqrt());
+    metrics.cloud.sigma_m = Some(sum.cloud_variance_m2().sqrt());
+    metrics.cloud.bias_m = Some(sum.cloud_bias_m());
+    metrics.clock.offset_end_error_s = Some(errors.clock_error_ms * 1e-3);
+    metrics
 }
 
 impl Sweep {

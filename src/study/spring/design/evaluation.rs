@@ -102,7 +102,7 @@ impl Evaluator {
     pub fn unchecked(&self, wire: &Wire) -> Vec<&'static str> {
         let unit = StressCycle { amplitude_pa: 1.0, mean_pa: 1.0 };
         let has_cable = matches!(&self.head.linkage, LinkageSpec::Spring { cable: Some(_), .. });
-        let has_stress_limit = self.spec.limits.iter().any(|limit| limit.measure == Measure::StressShare);
+        let has_stress_limit = self.spec.limits.iter().any(|limit| limit.measure == Measure::STRESS_SHARE);
         let mut unchecked = Vec::new();
         if has_cable {
             unchecked.extend(["clash_margin", "gap_over_standard", "solid_margin", "buckling_margin"]);

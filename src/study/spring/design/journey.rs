@@ -57,9 +57,9 @@ impl Journeys {
         };
         let mut measures: Vec<Measure> = measures.filter(|measure| measure.needs_journey()).collect();
         if measures.iter().any(|measure| measure.is_of_estimate()) {
-            measures.push(Measure::Status);
+            measures.push(Measure::STATUS);
         }
-        measures.push(Measure::CoilContactS);
+        measures.push(Measure::COIL_CONTACT_S);
         measures.sort_unstable();
         measures.dedup();
         Ok(Self {
@@ -81,7 +81,7 @@ impl Journeys {
             journey.simulation.head.spec = head.clone();
             let values = journey_figures(&journey, &self.measures, self.limit)?;
             for (measure, value) in self.measures.iter().zip(values) {
-                let is_lost = *measure == Measure::Status && value == Some(f64::from(Status::Lost as u8));
+                let is_lost = *measure == Measure::STATUS && value == Some(f64::from(Status::Lost as u8));
                 let Some(value) = value.filter(|_| !is_lost) else {
                     let Seed(seed) = journey.simulation.seed;
                     let what = if is_lost { "lost estimate".to_owned() } else { format!("no {}", measure.key()) };

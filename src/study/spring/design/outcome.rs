@@ -25,8 +25,9 @@ impl DesignSearch {
     ) -> Result<Outcomes, StudyError> {
         // A journey depends on how the head swings, so designs differ in that too.
         let features = |candidate: &Candidate| {
-            let swing = [Measure::RockingHz, Measure::FieldOfViewDeg, Measure::RateDegPerS];
-            let swing = swing.map(|measure| candidate.figures.cost_figure(measure));
+            const SWING: [Measure; 3] =
+                [Measure::named("rocking_hz"), Measure::named("field_of_view_deg"), Measure::named("rate_deg_per_s")];
+            let swing = SWING.map(|measure| candidate.figures.cost_figure(measure));
             candidate.costs.iter().copied().chain(swing).collect::<Vec<f64>>()
         };
         let chosen = spread(&feasible.iter().map(features).collect::<Vec<_>>(), journeys.designs);
@@ -77,9 +78,9 @@ impl DesignSearch {
             Err(error @ StudyError::File { .. }) => return Err(error),
             Err(error) => return Ok(Err(reject(error.to_string(), None))),
         };
-        let contact_s = design.journey.get(&Measure::CoilContactS).copied().filter(|contact_s| *contact_s > 0.0);
+        let contact_s = design.journey.get(&Measure::COIL_CONTACT_S).copied().filter(|contact_s| *contact_s > 0.0);
         let contact = contact_s.map(|contact_s| Violation {
-            limit: Measure::CoilContactS.key(),
+            limit: Measure::COIL_CONTACT_S.key(),
             value: Some(contact_s),
             excess: f64::INFINITY,
         });

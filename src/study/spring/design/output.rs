@@ -10,17 +10,18 @@ use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// Columns of the metrics.
 const METRICS: [Measure; 7] = [
-    Measure::RockingHz,
-    Measure::PeakGain,
-    Measure::FieldOfViewDeg,
-    Measure::RateDegPerS,
-    Measure::SagMm,
-    Measure::SpringMassG,
-    Measure::StressShare,
+    Measure::named("rocking_hz"),
+    Measure::PEAK_GAIN,
+    Measure::named("field_of_view_deg"),
+    Measure::named("rate_deg_per_s"),
+    Measure::named("sag_mm"),
+    Measure::named("spring_mass_g"),
+    Measure::STRESS_SHARE,
 ];
 
 /// The metrics that a simulation has too; the others follow from the linear head.
-const SIMULATED: [Measure; 3] = [Measure::FieldOfViewDeg, Measure::RateDegPerS, Measure::StressShare];
+const SIMULATED: [Measure; 3] =
+    [Measure::named("field_of_view_deg"), Measure::named("rate_deg_per_s"), Measure::STRESS_SHARE];
 
 /// Formats the verified designs as CSV.
 ///
@@ -96,7 +97,7 @@ pub fn pareto_figure(study: &DesignStudy) -> Figure {
     let cloud = study.cloud.iter().map(|(a, b)| (a * x.unit().1, b * y.unit().1)).collect();
     // Thousands of designs in closed form, tens with journeys.
     let is_by_journeys = study.spec.journey.is_some();
-    let chart = Chart::new("Pareto set of the springs within limits", x.label(), y.label());
+    let chart = Chart::new("Pareto set of the springs within limits", &x.label(), &y.label());
     let chart = chart.with(Series::dots("feasible", Colour::Backdrop, cloud).marked(Mark::Dots(if is_by_journeys {
         3.0
     } else {

@@ -58,9 +58,9 @@ impl Space {
     pub fn missing_for(&self, measure: Measure) -> Option<&'static str> {
         let Space::Coils(CoilSpace { material, bounds, .. }) = self else { return None };
         let wire_m = 1e-3 * bounds[1][0];
-        match measure {
-            Measure::StressShare => material.yield_pa(wire_m).is_none().then_some("strength"),
-            Measure::SpringMassG => material.density_kg_per_m3().is_none().then_some("density"),
+        match measure.key() {
+            "stress_share" => material.yield_pa(wire_m).is_none().then_some("strength"),
+            "spring_mass_g" => material.density_kg_per_m3().is_none().then_some("density"),
             _ => None,
         }
     }
