@@ -1,7 +1,9 @@
 //! Summary of a sweep: statistics of each measure per axis and level.
 
+use super::measure::Needs;
 use super::paired::{holm, signed_rank_p};
 use super::runs::{Runs, level_count, level_label};
+use super::table::{Column, ColumnType};
 use super::trend::rank_correlation;
 use super::{Measure, Plan, Sampling, Sweep};
 use crate::StudyError;
@@ -146,10 +148,20 @@ impl Sweep {
         Ok(summary)
     }
 
-    /// A measure of all rows of the merged table; a missing figure is infinite for a lost estimate, else NaN.
+    /// A measure of all rows of the merged table.
+    ///
+    /// A missing figure is infinite for a failed estimate, and against a reference that is lost; else it is NaN, as the drift of a
+    /// run that is too short for it.
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
-        let missing = if measure.is_of_estimate() { f64::INFINITY } else { f64::NAN };
-        Ok(self.read_measure(measure)?.into_iter().map(|cell| cell.unwrap_or(missing)).collect())
+        let errors = self.read_merged(&self.table(), &[("error", ColumnType::Text)])?;
+        let is_failed = errors.into_iter().flat_map(Column::texts).map(|error| error.is_some());
+        let missing = |is_failed: bool| match measure.needs() {
+            Needs::Reference => f64::INFINITY,
+            _ if is_failed && measure.is_of_estimate() => f64::INFINITY,
+            _ => f64::NAN,
+        };
+        let cells = self.read_measure(measure)?.into_iter().zip(is_failed);
+        Ok(cells.map(|(cell, is_failed)| cell.unwrap_or_else(|| missing(is_failed))).collect())
     }
 }
 
