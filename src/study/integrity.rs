@@ -220,6 +220,7 @@ impl Integrity {
             aligned_rmse_m: check.map(|check| check.rmse_m),
             largest_error_m: check.map(|check| check.largest_m),
             path_length_m: Some(path_length_m(trajectory)),
+            aligned_p95_m: check.map(|check| check.p95_m),
         }
     }
 
@@ -229,7 +230,8 @@ impl Integrity {
         let mut bounds = self.bounds.iter();
         let mut current = bounds.next()?;
         let mut ratios = Vec::with_capacity(errors.stamps.len());
-        let (mut within, mut largest_m) = (0, 0.0_f64);
+        let mut errors_m = Vec::with_capacity(errors.stamps.len());
+        let mut within = 0;
         for (stamp, error) in errors.stamps.iter().zip(&errors.position_m) {
             let error_m = error.norm();
             while current.stamp < *stamp {
@@ -237,14 +239,15 @@ impl Integrity {
                 current = next;
             }
             within += usize::from(error_m <= current.bound_m_99);
-            largest_m = largest_m.max(error_m);
+            errors_m.push(error_m);
             ratios.push(current.bound_m_99 / error_m.max(1e-9));
         }
         Some(BoundCheck {
             fraction_within: within as f64 / ratios.len() as f64,
             bound_over_error: median(ratios)?,
             rmse_m: errors.position_rmse_m(),
-            largest_m,
+            p95_m: quantile(&mut errors_m, 0.95)?,
+            largest_m: *errors_m.last()?,
         })
     }
 
@@ -268,13 +271,20 @@ struct BoundCheck {
     bound_over_error: f64,
     /// RMS position error, m.
     rmse_m: f64,
+    /// 95 % quantile of the position error, m.
+    p95_m: f64,
     /// Largest position error, m.
     largest_m: f64,
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
+    quantile(&mut values, 0.5)
+}
+
+/// Sorts `values`; returns the first that is above the fraction `at` of them, `None` without values.
+fn quantile(values: &mut [f64], at: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    values.get((values.len() as f64 * at) as usize).copied()
 }
 
 /// Path length of the head, m, from positions at 1 s intervals, so that the swing on the spring does not count.

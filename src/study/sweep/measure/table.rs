@@ -121,6 +121,8 @@ measures! {
     /// Position error of the final trajectory (loop-closed if that is requested) after rigid alignment over the first
     /// 20 s (half of a shorter run), root mean square, m.
     aligned_rmse_m: OpenLoop |r| r.metrics.integrity.aligned_rmse_m => ("aligned", "Position error, aligned over the first 20 s, RMS", MM);
+    /// 95 % quantile of the position error over the poses, after the same alignment, m.
+    aligned_p95_m: OpenLoop |r| r.metrics.integrity.aligned_p95_m => ("95 % quantile", "Position error, 95 % quantile", MM);
     /// Largest position error after the same alignment, m.
     largest_error_m: OpenLoop |r| r.metrics.integrity.largest_error_m => ("largest", "Largest position error", MM);
     /// Median of the 99 % bound on the aligned position error, m.
