@@ -59,6 +59,8 @@ pub struct IntegrityMetrics {
     pub largest_error_m: Option<f64>,
     /// 95 % quantile of the position error after alignment over the first 20 s, m; `None` without truth.
     pub aligned_p95_m: Option<f64>,
+    /// Fraction of the time in which a cause degrades the result.
+    pub degraded_fraction: Option<f64>,
     /// Length of the estimated path, from positions one second apart, m.
     pub path_length_m: Option<f64>,
 }

@@ -221,7 +221,25 @@ impl Integrity {
             largest_error_m: check.map(|check| check.largest_m),
             path_length_m: Some(path_length_m(trajectory)),
             aligned_p95_m: check.map(|check| check.p95_m),
+            degraded_fraction: self.degraded_fraction(trajectory),
         }
+    }
+
+    /// Computes the fraction of the time of `trajectory` in which a finding affects it; `None` without two poses.
+    fn degraded_fraction(&self, trajectory: &Trajectory) -> Option<f64> {
+        let (first, last) = (*trajectory.stamps().first()?, *trajectory.stamps().last()?);
+        let mut intervals: Vec<(Stamp, Stamp)> =
+            self.findings.iter().map(|finding| (finding.from, finding.to)).collect();
+        intervals.sort_unstable();
+        let (mut until, mut degraded_s) = (first, 0.0);
+        for (from, to) in intervals {
+            let (from, to) = (from.max(until), to.min(last));
+            if to > from {
+                degraded_s += to.seconds_since(from);
+                until = to;
+            }
+        }
+        Some(degraded_s / last.seconds_since(first)).filter(|fraction| fraction.is_finite())
     }
 
     /// Compares the bounds with the true errors.
@@ -383,4 +401,26 @@ fn write(folder: &Path, name: &str, header: &str, mut rows: impl Iterator<Item =
     written.map_err(StudyError::file(&path))?;
     let file = file.into_inner().map_err(|error| StudyError::file(&path)(error.into_error()))?;
     file.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overlapping_causes_degrade_a_time_once() {
+        let at = |s: f64| Stamp::from_nanos(0) + Span::from_seconds(s);
+        let finding = |from: f64, to: f64| Finding {
+            status: Status::Degraded,
+            cause: Cause::NotRelocalised,
+            from: at(from),
+            to: at(to),
+        };
+        let trajectory = Trajectory::from_poses([0.0, 20.0].map(|s| (at(s), Pose::identity()))).unwrap();
+        let degraded = |findings| Integrity { bounds: Vec::new(), findings }.degraded_fraction(&trajectory).unwrap();
+        assert_eq!(degraded(Vec::new()), 0.0);
+        // 2 to 8 s, and 15 s to the end.
+        let findings = vec![finding(15.0, 30.0), finding(4.0, 8.0), finding(2.0, 6.0), finding(5.0, 5.5)];
+        assert!((degraded(findings) - 0.55).abs() < 1e-9);
+    }
 }

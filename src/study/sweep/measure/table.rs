@@ -123,6 +123,8 @@ measures! {
     aligned_rmse_m: OpenLoop |r| r.metrics.integrity.aligned_rmse_m => ("aligned", "Position error, aligned over the first 20 s, RMS", MM);
     /// 95 % quantile of the position error over the poses, after the same alignment, m.
     aligned_p95_m: OpenLoop |r| r.metrics.integrity.aligned_p95_m => ("95 % quantile", "Position error, 95 % quantile", MM);
+    /// Fraction of the time in which a cause degrades the estimate: the length of all intervals that the verdict names.
+    degraded_fraction: OpenLoop |r| r.metrics.integrity.degraded_fraction => ("degraded", "Time degraded", PERCENT);
     /// Largest position error after the same alignment, m.
     largest_error_m: OpenLoop |r| r.metrics.integrity.largest_error_m => ("largest", "Largest position error", MM);
     /// Median of the 99 % bound on the aligned position error, m.
