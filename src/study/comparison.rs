@@ -87,11 +87,7 @@ pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetri
 }
 
 /// Metrics of the open loop.
-pub(super) fn open_loop_metrics(
-    run: &OpenLoopRun,
-    comparison: Option<&Comparison>,
-    dead_reckoning: Option<ImuOnlyDrift>,
-) -> OpenLoopMetrics {
+pub(super) fn open_loop_metrics(run: &OpenLoopRun, comparison: Option<&Comparison>) -> OpenLoopMetrics {
     let drift = comparison.and_then(|found| found.drift);
     let errors = comparison.and_then(|found| found.errors.as_ref());
     let consistency = comparison.and_then(|found| found.consistency);
@@ -106,7 +102,7 @@ pub(super) fn open_loop_metrics(
         yaw_drift_deg_per_min: drift.and_then(|drift| drift.yaw_rad_per_min).map(f64::to_degrees),
         end_error_m: drift.map(|drift| drift.end_error_m),
         relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
-        imu_only_drift_m_per_min: dead_reckoning.map(|drift| drift.0),
+        imu_only_drift_m_per_min: None,
         position_nees: consistency.map(|found| found.position_nees),
         attitude_nees: consistency.map(|found| found.attitude_nees),
     }
@@ -137,18 +133,18 @@ pub(super) fn closed_loop_metrics(
     }
 }
 
-/// Position drift of IMU dead reckoning, m/min.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ImuOnlyDrift(f64);
-
-/// Computes the drift of IMU dead reckoning; `None` if it is not defined.
+/// Computes the position drift of IMU dead reckoning, m/min; `None` if it is not defined.
 ///
 /// The trajectory is on the IMU clock, which differs from the lidar clock by milliseconds; the effect is negligible
 /// relative to the drift.
-pub(super) fn imu_only(run: &OpenLoopRun, truth: &SampledTruth, watch: &mut ProgressMonitor) -> Option<ImuOnlyDrift> {
+pub(super) fn imu_only_drift_m_per_min(
+    run: &OpenLoopRun,
+    truth: &SampledTruth,
+    watch: &mut ProgressMonitor,
+) -> Option<f64> {
     let dead_reckoning = run.dead_reckoning.as_ref().map_err(Clone::clone);
     let pairs = Pairs::of(or_note(dead_reckoning, watch)?, &truth.dead_reckoned_heads);
-    drift(&pairs).ok().map(|drift| ImuOnlyDrift(drift.position_m_per_min))
+    drift(&pairs).ok().map(|drift| drift.position_m_per_min)
 }
 
 /// Metrics of the clock offset.

@@ -1,31 +1,28 @@
 //! Estimation from a recording, with evaluation and output files.
 
 use super::background::with_background;
-use super::best_estimate::BestEstimate;
 use super::bound::{BoundAccumulator, RecordingBound};
 use super::calibration::calibration;
-use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::cloud::{Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
 use super::comparison::Comparison;
-use super::integrity::{Integrity, write_windows};
+use super::integrity::write_windows;
+use super::loops::{LoopInputs, Loops};
 use super::map::write_map;
 use super::map_options::MapOptions;
-use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
 use super::origin::Origin;
 use super::page::RunResults;
 use super::progress::check;
 use super::recorded_manifest::RecordedManifest;
 use super::register::{RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
-use super::sampled_truth::SampledTruth;
 use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, ProgressMonitor, Stage, StudyError, artefacts, comparison, memory};
 use std::path::Path;
 use zsim_estimation::{EstimatorSpec, Timing};
-use zsim_evaluation::{Errors, MapKnowledge, Pairs};
-use zsim_recording::{FoundCalibration, Reader, Selection, write_tum};
-use zsim_report::{ClosedLoopMetrics, Metrics, OpenLoopMetrics};
+use zsim_evaluation::MapKnowledge;
+use zsim_recording::{FoundCalibration, Reader, Selection};
+use zsim_report::Metrics;
 use zsim_simulation::carrier_of;
 
 /// The frame of the true poses in recordings of zsim.
@@ -118,34 +115,24 @@ pub(super) fn estimate_in(
         watch.note(&models.note());
     }
 
-    let inputs = LoopInputs { reader, selection, found: &found, options, origin };
-    let mut bound = inputs.bound()?;
-    let loops = inputs.run(bound.as_mut(), folder, watch)?;
-    let (registered, bound) = inputs.register(&loops, bound, folder, watch)?;
+    let estimated = Estimated { reader, selection, found: &found, options, origin };
+    let mut bound = estimated.bound()?;
+    let loops = estimated.loops(bound.as_mut(), folder, watch)?;
+    let (registered, bound) = estimated.register(&loops, bound, folder, watch)?;
     let (run, truth, best) = (&loops.open, loops.truth.as_ref(), loops.best());
 
     watch.progress(Stage::Reporting, 0.0, None);
-    let imu_only_drift = truth.and_then(|truth| comparison::imu_only(run, truth, watch));
+    let imu_only_drift_m_per_min = truth.and_then(|truth| comparison::imu_only_drift_m_per_min(run, truth, watch));
     let bound = bound.as_ref().map(|recording| &recording.bound);
-    let bound_rmse_m = bound.map(|bound| bound.aligned_position_rmse_m);
-    let fixed_views = Some(options.estimator.fixed_views as u64);
-    let integrity = Integrity::of(run, loops.closed.as_ref(), best.map_from_head);
-    let pairs = truth.map(|truth| Pairs::of(best.map_from_head, &truth.heads));
-    let metrics = Metrics {
-        status: Some(integrity.status().name().to_owned()),
-        integrity: integrity.metrics(run, best.map_from_head, pairs.as_ref()),
+    let (integrity, pairs) = (loops.integrity(), loops.pairs());
+    let mut metrics = Metrics {
         sensors: models.metrics(),
-        losses: run.events.losses.clone(),
-        notes: run.events.notes.clone(),
-        open_loop: OpenLoopMetrics {
-            fixed_views,
-            ..comparison::open_loop_metrics(run, loops.comparison.as_ref(), imu_only_drift)
-        },
-        closed_loop: ClosedLoopMetrics { bound_rmse_m, ..loops.closed_metrics() },
-        clock: comparison::clock_metrics(run, truth),
         lidar: comparison::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
-        ..metrics(origin, run, registered.as_ref(), best.comparison)
+        ..described(origin, registered.as_ref(), best.comparison, loops.metrics(&integrity, pairs.as_ref()))
     };
+    metrics.open_loop.fixed_views = Some(options.estimator.fixed_views as u64);
+    metrics.open_loop.imu_only_drift_m_per_min = imu_only_drift_m_per_min;
+    metrics.closed_loop.bound_rmse_m = bound.map(|bound| bound.aligned_position_rmse_m);
     integrity.write(folder)?;
     write_windows(folder, &run.windows)?;
     watch.check_stop()?;
@@ -169,8 +156,8 @@ pub(super) fn estimate_in(
     Ok(EstimateResult { metrics, timing: loops.open.timing })
 }
 
-/// Inputs of the open loop, the closed loop and the registration of the cloud.
-struct LoopInputs<'a> {
+/// A recording that is estimated with these options.
+struct Estimated<'a> {
     reader: &'a Reader,
     selection: &'a Selection,
     found: &'a FoundCalibration,
@@ -178,7 +165,7 @@ struct LoopInputs<'a> {
     origin: &'a Origin<'a>,
 }
 
-impl<'a> LoopInputs<'a> {
+impl<'a> Estimated<'a> {
     /// The information bound, without truth and measurements; `None` if the scene is not known.
     fn bound(&self) -> Result<Option<BoundAccumulator<'a>>, StudyError> {
         let Some(Surroundings { world, .. }) = self.origin.surroundings else { return Ok(None) };
@@ -225,112 +212,45 @@ impl<'a> LoopInputs<'a> {
     /// Runs both loops and writes the trajectories and the map to `folder`.
     ///
     /// The truth is also added to `bound`.
-    fn run(
+    fn loops(
         &self,
         bound: Option<&mut BoundAccumulator>,
         folder: &Path,
         watch: &mut ProgressMonitor,
     ) -> Result<Loops, StudyError> {
         let Self { reader, selection, found, options, origin } = *self;
-        let (estimator, calibration) = (&options.estimator, &found.calibration);
-        let prior_map = options.map.as_ref();
-        let closes_loops = options.closed_loop && prior_map.is_none();
+        let map = options.map.as_ref();
+        let closes_loops = options.closed_loop && map.is_none();
         if options.closed_loop && !closes_loops {
             watch.note("the global registration is skipped: it does not use the given map");
         }
-        let writes_map = prior_map.map_or(options.closed_loop, |map| map.extend);
-        let open_loop =
-            OpenLoopOptions { estimator, calibration, recording_surfels: closes_loops || writes_map, map: prior_map };
-        let expected_s = origin.simulation.map(|summary| summary.duration_s);
-        let open = run_open_loop(reader, selection, open_loop, Some(&folder.join("open_loop.tum")), expected_s, watch)?;
-        open.events.notes.iter().for_each(|note| watch.note(&note.line()));
-        let closed = match closes_loops {
-            true => Some(close_loops(&open, folder, open_loop, watch)?),
-            false => None,
+        let writes_map = map.map_or(options.closed_loop, |map| map.extend);
+        let inputs = LoopInputs {
+            reader,
+            selection,
+            calibration: &found.calibration,
+            estimator: &options.estimator,
+            map,
+            closes_loops,
+            keeps_surfels: writes_map,
+            has_truth: found.body_frame == TRUE_FRAME,
+            folder: Some(folder),
+            expected_s: origin.simulation.map(|summary| summary.duration_s),
         };
-        watch.progress(Stage::Evaluating, 0.0, None);
-        let truth = match found.body_frame == TRUE_FRAME {
-            true => SampledTruth::read(reader, &open, bound)?,
-            false => None,
-        };
-        let mut compare = |map_from_head, covariances: &[_]| {
-            truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, watch))
-        };
-        let comparison = compare(&open.map_from_head, &open.covariances);
-        let closed_comparison = closed.as_ref().and_then(|closed| compare(&closed.map_from_head, &closed.covariances));
-        let loops = Loops { open, truth, comparison, closed, closed_comparison };
+        let loops = inputs.run(bound, watch)?;
         if writes_map && !loops.open.observed.is_empty() {
-            write_map(&loops.open, &loops.best(), estimator, prior_map, folder)?;
+            write_map(&loops.open, &loops.best(), &options.estimator, map, folder)?;
         }
         Ok(loops)
     }
 }
 
-/// Open loop and closed loop, each with its comparison with the truth.
-struct Loops {
-    open: OpenLoopRun,
-    truth: Option<SampledTruth>,
-    comparison: Option<Comparison>,
-    closed: Option<ClosedLoopRun>,
-    closed_comparison: Option<Comparison>,
-}
-
-impl Loops {
-    fn best(&self) -> BestEstimate<'_> {
-        let open = &self.open.map_from_head;
-        match &self.closed {
-            Some(ClosedLoopRun { map_from_head, covariances, lidar, open_loop_recalibrated, .. }) => BestEstimate {
-                map_from_head,
-                covariances,
-                observed_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
-                lidar,
-                comparison: self.closed_comparison.as_ref(),
-            },
-            None => BestEstimate {
-                map_from_head: open,
-                covariances: &self.open.covariances,
-                observed_trajectory: open,
-                lidar: &self.open.lidar,
-                comparison: self.comparison.as_ref(),
-            },
-        }
-    }
-
-    /// Errors of the open loop if a closed loop was computed.
-    fn open_errors(&self) -> Option<&Errors> {
-        self.closed.as_ref()?;
-        Some(&self.comparison.as_ref()?.errors.as_ref()?.decimated)
-    }
-
-    fn closed_metrics(&self) -> ClosedLoopMetrics {
-        let (comparison, acquisition_s) = (self.closed_comparison.as_ref(), self.open.acquisition_s);
-        let metrics =
-            self.closed.as_ref().map(|closed| comparison::closed_loop_metrics(closed, comparison, acquisition_s));
-        metrics.unwrap_or_default()
-    }
-}
-
-/// Runs the closed loop and writes the trajectory.
-fn close_loops(
-    run: &OpenLoopRun,
-    folder: &Path,
-    options: OpenLoopOptions,
-    watch: &mut ProgressMonitor,
-) -> Result<ClosedLoopRun, StudyError> {
-    watch.progress(Stage::ClosingLoops, 0.0, None);
-    let closed = run_closed_loop(run, options.calibration, options.estimator)?;
-    closed.notes.iter().for_each(|note| watch.note(note));
-    write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
-    watch.check_stop()?;
-    Ok(closed)
-}
-
-/// All metrics except those of the two loops, the clock and the integrity.
-fn metrics(
+/// Adds the origin of the recording and the cloud to the metrics of the estimate.
+fn described(
     origin: &Origin,
-    run: &OpenLoopRun,
     registered: Option<&RegisteredCloud>,
     comparison: Option<&Comparison>,
+    estimate: Metrics,
 ) -> Metrics {
     let inputs = origin.manifest.run.as_ref();
     let world_from_map = comparison.and_then(|comparison| comparison.world_from_map);
@@ -338,13 +258,13 @@ fn metrics(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: inputs.map(|inputs| inputs.scene.spec.name.clone()),
         seed: inputs.map(|inputs| inputs.seed.0),
-        duration_s: origin.simulation.map_or(run.acquisition_s, |summary| summary.duration_s),
+        duration_s: origin.simulation.map_or(estimate.duration_s, |summary| summary.duration_s),
         simulation: origin.simulation.map(comparison::simulation_metrics).unwrap_or_default(),
         cloud: registered
             .map(|registered| cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings))
             .unwrap_or_default(),
         peak_rss_mib: memory::peak_rss_mib(),
-        ..Metrics::default()
+        ..estimate
     }
 }
 

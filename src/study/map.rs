@@ -2,7 +2,7 @@
 
 use super::StudyError;
 use super::atomic_file::AtomicFile;
-use super::best_estimate::BestEstimate;
+use super::loops::BestEstimate;
 use super::map_options::MapOptions;
 use super::open_loop::OpenLoopRun;
 use std::path::Path;

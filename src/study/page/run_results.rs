@@ -1,7 +1,7 @@
 //! Results of a run that the page shows.
 
-use super::super::best_estimate::BestEstimate;
 use super::super::integrity::Integrity;
+use super::super::loops::BestEstimate;
 use super::super::open_loop::OpenLoopRun;
 use super::super::origin::Origin;
 use super::super::sampled_truth::SampledTruth;

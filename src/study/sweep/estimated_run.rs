@@ -3,10 +3,9 @@
 use super::clock_curve::ClockCurve;
 use super::reference_system::{CloudComparison, ReferenceMap};
 use super::results::Results;
-use super::run_recording::{Estimates, RunRecording};
+use super::run_recording::RunRecording;
 use super::tree::Journey;
-use crate::comparison::{self, Comparison};
-use crate::integrity::Integrity;
+use crate::loops::Loops;
 use crate::sampled_truth::SampledTruth;
 use crate::{ProgressMonitor, StudyError};
 use std::fs::File;
@@ -14,7 +13,6 @@ use std::sync::atomic::AtomicBool;
 use zsim_base::geometry::Trajectory;
 use zsim_dynamics::HeadModel;
 use zsim_evaluation::{Errors, Pairs};
-use zsim_report::Metrics;
 use zsim_simulation::Simulation;
 
 /// What a run is compared with.
@@ -43,41 +41,23 @@ pub(super) fn estimate(
     pool.install(|| {
         let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
         let recording = RunRecording::open(recording, inputs.journey.ignore_manifest)?;
-        let estimates = recording.estimate(inputs.journey, inputs.closes_loops, &mut watch)?;
-        let mut results = results(&estimates, inputs, &mut watch);
+        let loops = recording.estimate(inputs.journey, inputs.closes_loops, &mut watch)?;
+        let mut results = results(&loops, inputs);
         if inputs.compares_clouds {
-            let compared = CloudComparison::new(&recording, &estimates, inputs.simulation, inputs.reference, &watch)?;
+            let compared = CloudComparison::new(&recording, &loops, inputs.simulation, inputs.reference, &watch)?;
             compared.add_to(&mut results);
         }
-        let curve = |truth: &SampledTruth| ClockCurve::new(&estimates.open.clock_offsets, &truth.clock_offsets);
-        Ok((results, estimates.truth.as_ref().map(curve)))
+        let curve = |truth: &SampledTruth| ClockCurve::new(&loops.open.clock_offsets, &truth.clock_offsets);
+        Ok((results, loops.truth.as_ref().map(curve)))
     })
 }
 
 /// The results without those of the cloud.
-fn results(estimates: &Estimates, inputs: &RunInputs, watch: &mut ProgressMonitor) -> Results {
-    let Estimates { open: run, closed, truth } = estimates;
-    let truth = truth.as_ref();
-    let mut compare =
-        |map_from_head, covariances| truth.map(|truth| Comparison::new(map_from_head, covariances, truth, watch));
-    let known = compare(&run.map_from_head, &run.covariances[..]);
-    let map_from_head = estimates.map_from_head();
-    let closed_loop = closed
-        .as_ref()
-        .map(|closed| comparison::closed_loop_metrics(closed, compare(map_from_head, &[]).as_ref(), run.acquisition_s));
-    let integrity = Integrity::of(run, closed.as_ref(), map_from_head);
-    let metrics = Metrics {
-        status: Some(integrity.status().name().to_owned()),
-        integrity: integrity.metrics(run, map_from_head, Some(&estimates.pairs())),
-        open_loop: comparison::open_loop_metrics(run, known.as_ref(), None),
-        closed_loop: closed_loop.unwrap_or_default(),
-        clock: comparison::clock_metrics(run, truth),
-        ..Metrics::default()
-    };
+fn results(loops: &Loops, inputs: &RunInputs) -> Results {
+    let rigid_link = |truth| rigid_link_rmse_m(inputs.simulation.head(), &loops.open.map_from_head, truth);
     Results {
-        metrics,
-        rigid_link_rmse_m: truth
-            .and_then(|truth| rigid_link_rmse_m(inputs.simulation.head(), &run.map_from_head, truth)),
+        metrics: loops.metrics(&loops.integrity(), loops.pairs().as_ref()),
+        rigid_link_rmse_m: loops.truth.as_ref().and_then(rigid_link),
         slam_bound_m: inputs.slam_bound_m,
         ..Results::default()
     }

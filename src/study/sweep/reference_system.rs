@@ -2,9 +2,10 @@
 
 use super::reference_inputs::ReferenceInputs;
 use super::results::{ReferenceResults, Results};
-use super::run_recording::{Estimates, RunRecording};
+use super::run_recording::RunRecording;
 use super::tree::Journey;
 use crate::cloud::Surroundings;
+use crate::loops::Loops;
 use crate::record::{description, record_together};
 use crate::register::ProjectedBeam;
 use crate::{ProgressMonitor, StudyError};
@@ -60,10 +61,10 @@ impl ReferenceMap {
             &ProgressMonitor { stop, report: &mut |_| {} },
         )?;
         let recording = RunRecording::open(file, false)?;
-        let estimates = recording.estimate(journey, true, &mut watch)?;
-        let aligned = AlignedCloud::new(&recording, &estimates, &simulation, MAX_REFERENCE_POINTS, &watch)?;
+        let loops = recording.estimate(journey, true, &mut watch)?;
+        let aligned = AlignedCloud::new(&recording, &loops, &simulation, MAX_REFERENCE_POINTS, &watch)?;
         // A lost reference has no surfaces to compare with.
-        let is_known = estimates.status() != Status::Lost;
+        let is_known = loops.integrity().status() != Status::Lost;
         let points = aligned.estimated.into_iter().filter(|_| is_known).map(|(point, _)| point);
         let estimator = journey.estimator.spec.clone();
         Ok(Self { inputs: inputs.clone(), estimator, cloud: ReferenceCloud::new(points), rmse_m: aligned.rmse_m })
@@ -91,16 +92,16 @@ struct AlignedCloud {
 impl AlignedCloud {
     fn new(
         recording: &RunRecording,
-        estimates: &Estimates,
+        loops: &Loops,
         simulation: &Simulation,
         limit: usize,
         watch: &ProgressMonitor,
     ) -> Result<Self, StudyError> {
-        let pairs: Pairs = estimates.pairs();
+        let pairs: Pairs = loops.pairs().unwrap_or_default();
         let world_from_map = align_poses(pairs.truth(), pairs.estimate(), TURN_LEVER_M)?;
         let carrier = carrier_of(&simulation.inputs().head.spec);
         let surroundings = Surroundings { world: simulation.world(), carrier: &carrier };
-        let beams = recording.with(estimates).static_beams(surroundings, limit, watch)?;
+        let beams = recording.with(loops).static_beams(surroundings, limit, watch)?;
         let moved = |beam: &ProjectedBeam, by: &Pose| {
             let at = |of: &Vector| by.rotation * of + by.translation.vector;
             (at(&beam.point), Some(at(&beam.origin)))
@@ -128,12 +129,12 @@ impl CloudComparison {
     /// If the recording cannot be read, if it cannot be aligned with the truth, or if the run is stopped.
     pub(super) fn new(
         recording: &RunRecording,
-        estimates: &Estimates,
+        loops: &Loops,
         simulation: &Simulation,
         reference: Option<&ReferenceMap>,
         watch: &ProgressMonitor,
     ) -> Result<Self, StudyError> {
-        let aligned = AlignedCloud::new(recording, estimates, simulation, MAX_POINTS, watch)?;
+        let aligned = AlignedCloud::new(recording, loops, simulation, MAX_POINTS, watch)?;
         let summary =
             |surface: &dyn Surface, points: &[SeenPoint]| CloudErrors::to_surface(surface, points, REACH_M).summary();
         Ok(Self {
