@@ -12,11 +12,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Modules of the room `base`, in order: each may use the modules before it.
-const BASE: [&str; 11] = [
+const BASE: [&str; 12] = [
     "time",
     "random",
     "files",
     "printable",
+    "unit",
     "similar",
     "geometry",
     "signal",

@@ -14,3 +14,4 @@ pub mod similar;
 pub mod spec;
 pub mod surfel_map;
 pub mod time;
+mod unit;

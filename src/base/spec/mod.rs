@@ -12,16 +12,15 @@ mod named;
 mod position;
 mod source;
 mod tree;
-mod unit;
 mod writer;
 
 pub use error::SpecError;
+pub use crate::unit::split_unit;
 pub use library::{Kind, KindByKeys, MAX_SPEC_BYTES, find, find_from, kind_by_keys, name_from, names, text_file};
 pub use named::{Named, NamedSpec};
 pub use position::Position;
 pub use source::Source;
 pub use tree::{Subtree, Tree};
-pub use unit::split_unit;
 pub use writer::to_json;
 
 use serde::de::DeserializeOwned;
