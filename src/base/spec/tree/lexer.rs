@@ -2,6 +2,7 @@
 
 use super::node::{Kind, Node};
 use super::number::Number;
+use crate::unit::split_unit;
 use std::borrow::Cow;
 
 /// An error in the syntax.
@@ -139,8 +140,18 @@ impl<'a> Lexer<'a> {
     pub fn number(&mut self) -> Parsed<Kind> {
         let start = self.at;
         let text = self.take_while(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '+' | '-'));
-        Number::parse(text).map(Kind::Number).map_err(|message| Fault { at: start, message })
+        Number::parse(text).map(Kind::Number).map_err(|fault| {
+            let message = without_unit(text).map(|number| format!("The unit is in the key: write {number}").into());
+            Fault { at: start, message: message.unwrap_or(fault) }
+        })
     }
+}
+
+/// The number in a text such as `5ms`; `None` if the text is not a number with a unit.
+fn without_unit(text: &str) -> Option<&str> {
+    let mut units = text.char_indices().filter(|(_, c)| c.is_ascii_alphabetic()).map(|(at, _)| text.split_at(at));
+    let has_unit = |unit: &str| matches!(split_unit(&unit.to_lowercase()), ("", Some(_)));
+    units.find(|(number, unit)| has_unit(unit) && Number::parse(number).is_ok()).map(|(number, _)| number)
 }
 
 /// White space of RON.

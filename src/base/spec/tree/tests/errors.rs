@@ -121,6 +121,10 @@ fn an_error_in_the_syntax_has_its_position() {
         ("(a: /* /* */ 1)", (1, 5), "Unclosed block comment"),
         ("(a: 1.2.3)", (1, 5), "Expected float"),
         ("(a: 0b12)", (1, 5), "Invalid digit '2' for base 2 integers"),
+        ("(a: 5ms)", (1, 5), "The unit is in the key: write 5"),
+        ("(a: -1.5e3kg)", (1, 5), "The unit is in the key: write -1.5e3"),
+        ("(a: 30deg)", (1, 5), "The unit is in the key: write 30"),
+        ("(a: 5us)", (1, 5), "The unit is in the key: write 5"),
         ("(a: 1._5)", (1, 5), "Unexpected underscore in float"),
     ] {
         let error = read::<serde::de::IgnoredAny>(text).unwrap_err();
