@@ -5,7 +5,7 @@ use super::carrier::CarrierSpec;
 use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
 pub use super::placement::PlacementSpec;
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find, name_from, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find, name_from, parse_named};
 use zsim_elasticity::SpringSpec;
 
 /// A head, the linkage to the base, and the carrier.
@@ -45,7 +45,7 @@ impl HeadSpec {
     /// # Errors
     /// If the text is invalid.
     pub fn read(source: &Source) -> Result<Self, SpecError> {
-        Ok(parse::<Self>(source)?.with_files_of(source))
+        Ok(Self::parse(source)?.with_files_of(source))
     }
 
     /// The head with the paths of the spring files that are in the folder of `source`.
@@ -254,7 +254,7 @@ impl NamedSpec for HeadSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 
     /// Replaces a spring that is given by name by its description, so that its settings can be varied.

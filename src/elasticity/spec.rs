@@ -2,7 +2,7 @@
 
 use super::{Coil, ElasticityError, Material, Matrix6, Spring, Winding};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 
 /// Spec of a spring: `specs/springs/NAME.ron`, or a value within a head.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
@@ -247,6 +247,6 @@ impl NamedSpec for SpringSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }

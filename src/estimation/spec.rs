@@ -2,7 +2,7 @@ pub use super::surfel_spec::{MatchingSpec, SurfelSpec};
 
 use super::{EstimationError, RegistrationSpec};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named};
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -234,7 +234,7 @@ impl NamedSpec for EstimatorSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }
 

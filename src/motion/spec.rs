@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use zsim_base::geometry::Route;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find, parse_named};
 
 /// Motion of the base, as written in a file of `specs/motions/`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -45,7 +45,7 @@ pub enum MotionSpec {
 /// If there is no such motion, or the spec is invalid.
 pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
     let source = find(Kind::Motion, name)?;
-    Ok((parse(&source)?, source))
+    Ok((MotionSpec::parse(&source)?, source))
 }
 
 impl MotionSpec {
@@ -94,6 +94,6 @@ impl NamedSpec for MotionSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }

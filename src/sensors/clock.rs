@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 use zsim_base::time::{Span, Stamp};
 
 /// Clocks of the sensors.
@@ -165,7 +165,7 @@ impl NamedSpec for ClocksSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }
 
@@ -222,7 +222,7 @@ mod tests {
         assert!(names.contains(&"drifting".to_owned()), "{names:?}");
         for name in names {
             let source = find(Kind::Clock, &name).unwrap();
-            let clocks = Clocks::new(&parse(&source).unwrap(), &source, Stamp::default()).unwrap();
+            let clocks = Clocks::new(&ClocksSpec::parse(&source).unwrap(), &source, Stamp::default()).unwrap();
             assert_eq!(
                 clocks.lidar.offset_at(0.0).nanos(),
                 -clocks.lidar.resolution().nanos() / 2,

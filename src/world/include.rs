@@ -3,7 +3,7 @@
 use super::build::build;
 use super::{ItemSpec, SceneSpec, ShapeSpec, WorldError};
 use std::collections::BTreeMap;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from, parse_named};
 
 /// Maximum depth of included scenes.
 const MAX_INCLUDE_DEPTH: usize = 16;
@@ -40,7 +40,7 @@ fn flatten(spec: &SceneSpec, chain: &[&Source]) -> Result<SceneSpec, WorldError>
             return Err(wrong(format!("is included {} levels deep; {MAX_INCLUDE_DEPTH} at most", chain.len())).into());
         }
         let other_chain: Vec<&Source> = chain.iter().copied().chain([&other]).collect();
-        let included = flatten(&parse(&other)?, &other_chain)?;
+        let included = flatten(&SceneSpec::parse(&other)?, &other_chain)?;
         if other.folder != source.folder && has_meshes(&included) {
             return Err(wrong("has meshes: keep it in the folder of the scene that includes it".to_owned()).into());
         }
@@ -97,7 +97,7 @@ impl NamedSpec for SceneSpec {
     type Error = WorldError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 
     fn resolved(self, source: &Source) -> Result<Self, WorldError> {

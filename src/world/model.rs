@@ -9,7 +9,7 @@ use super::{Hit, Material, MaterialId, Ray, SceneSpec, TimedRay, WorldError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use zsim_base::geometry::{Route, Surface, SurfacePoint, Vector};
-use zsim_base::spec::{Kind, Source, find, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, find};
 
 /// Distance within which two hits are the same surface for [`World::cast_beyond`], m.
 const SAME_SURFACE_M: f64 = 1e-4;
@@ -35,7 +35,7 @@ impl World {
     /// If there is no such scene, or it is invalid.
     pub fn load(name_or_path: &str) -> Result<Self, WorldError> {
         let source = find(Kind::Scene, name_or_path)?;
-        Self::build(&parse(&source)?, &source)
+        Self::build(&SceneSpec::parse(&source)?, &source)
     }
 
     /// Builds the world that a scene describes. `source` is the text of the scene, for errors and for the folder of its

@@ -113,7 +113,7 @@ fn of_a_manifest_with_a_renamed_key_the_other_sensor_is_read() {
 fn of_a_manifest_without_a_key_of_the_imu_the_lidar_is_read() {
     let (metrics, stderr) = estimated_with("imu: (", "rate_hz: 100.0,", "");
     assert!(stderr.contains("its model of the lidar is used, that of the IMU is unknown"), "{stderr}");
-    assert!(stderr.contains("missing field named `rate_hz`"), "{stderr}");
+    assert!(stderr.contains("`ImuSpec` needs `rate_hz`"), "{stderr}");
     assert_eq!(noise(&metrics, "imu.gyro_limit_rad_per_s"), (2000_f64.to_radians(), "assumed"));
     assert_eq!(noise(&metrics, "lidar.near_sigma_m"), (0.01, MANIFEST));
 }

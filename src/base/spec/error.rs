@@ -1,4 +1,4 @@
-use super::{Position, Source};
+use super::{Missing, Position, Source};
 use std::fmt;
 
 /// An error in a spec: file, position, message, and remedy.
@@ -8,8 +8,17 @@ pub struct SpecError {
     place: Option<Place>,
     message: Box<str>,
     help: Option<Box<str>>,
-    /// The key that the type does not have, if this is the error.
-    unknown_key: Option<Box<str>>,
+    /// The key at fault.
+    key: Option<Box<KeyFault>>,
+}
+
+/// A key at fault, from which [`parse`](super::parse) finds a remedy.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum KeyFault {
+    /// The type does not have this key.
+    Unknown(String),
+    /// The text does not have it.
+    Missing(Missing),
 }
 
 /// A position, and the line of the text that contains it.
@@ -22,7 +31,7 @@ struct Place {
 impl SpecError {
     /// An error about a file as a whole.
     pub fn plain(file: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { file: file.into(), place: None, message: message.into().into_boxed_str(), help: None, unknown_key: None }
+        Self { file: file.into(), place: None, message: message.into().into_boxed_str(), help: None, key: None }
     }
 
     /// An error at a position in the text of a spec.
@@ -58,12 +67,33 @@ impl SpecError {
 
     /// Marks the error as a key that the type does not have.
     pub(super) fn with_unknown_key(self, key: Option<&str>) -> Self {
-        Self { unknown_key: key.map(Box::from), ..self }
+        Self { key: key.map(|key| Box::new(KeyFault::Unknown(key.to_owned()))).or(self.key), ..self }
     }
 
     /// The key that the type does not have, if this is the error.
     pub(super) fn unknown_key(&self) -> Option<&str> {
-        self.unknown_key.as_deref()
+        match self.key.as_deref()? {
+            KeyFault::Unknown(key) => Some(key),
+            KeyFault::Missing(_) => None,
+        }
+    }
+
+    /// Marks the error as keys that the text does not have.
+    pub(super) fn with_missing(self, missing: Option<Missing>) -> Self {
+        Self { key: missing.map(|missing| Box::new(KeyFault::Missing(missing))).or(self.key), ..self }
+    }
+
+    /// The keys that the text does not have, if this is the error.
+    pub(super) fn missing(&self) -> Option<&Missing> {
+        match self.key.as_deref()? {
+            KeyFault::Missing(missing) => Some(missing),
+            KeyFault::Unknown(_) => None,
+        }
+    }
+
+    /// The same error with another message.
+    pub(super) fn with_message(self, message: String) -> Self {
+        Self { message: message.into_boxed_str(), ..self }
     }
 
     /// Line and column, from 1, if known.

@@ -8,14 +8,15 @@
 pub mod checked;
 mod error;
 mod library;
+mod missing;
 mod named;
 mod position;
 mod source;
 mod tree;
 mod writer;
 
-pub use error::SpecError;
 pub use crate::unit::split_unit;
+pub use error::SpecError;
 pub use library::{Kind, KindByKeys, MAX_SPEC_BYTES, find, find_from, kind_by_keys, name_from, names, text_file};
 pub use named::{Named, NamedSpec};
 pub use position::Position;
@@ -23,6 +24,8 @@ pub use source::Source;
 pub use tree::{Subtree, Tree};
 pub use writer::to_json;
 
+use missing::Missing;
+use schemars::schema_for;
 use serde::de::DeserializeOwned;
 
 /// Parses the text of a spec.
@@ -44,12 +47,27 @@ pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
     })
 }
 
+/// Parses the text of a spec as [`parse`] does; an error about a missing key names all that are missing.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_named<T: NamedSpec>(source: &Source) -> Result<T, SpecError> {
+    parse(source).map_err(|error: SpecError| match error.missing() {
+        Some(missing) => {
+            let message = missing.message(schema_for!(T).as_value());
+            let help = format!("`zsim spec reference {}` lists the keys", T::KIND.noun().to_lowercase());
+            error.with_message(message).with_help(help)
+        }
+        None => error,
+    })
+}
+
 /// Finds and parses the spec of `kind` called `name`: a path, or a name in the library.
 ///
 /// # Errors
 /// If there is no such spec, or it is invalid.
-pub fn load<T: DeserializeOwned>(kind: Kind, name: &str) -> Result<T, SpecError> {
-    parse(&find(kind, name)?)
+pub fn load<T: NamedSpec>(kind: Kind, name: &str) -> Result<T, SpecError> {
+    T::parse(&find(kind, name)?)
 }
 
 /// Writes a spec as RON that [`parse`] reads back to the same numbers.

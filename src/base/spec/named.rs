@@ -1,19 +1,20 @@
 //! Specs that a run refers to by name.
 
 use super::{Kind, Source, SpecError, find};
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A spec that a run refers to by name.
-pub trait NamedSpec: DeserializeOwned {
+pub trait NamedSpec: DeserializeOwned + JsonSchema {
     /// Kind of the spec; it determines the folder in the library.
     const KIND: Kind;
 
     /// Why a spec, or a file that it includes, is invalid.
     type Error: From<SpecError>;
 
-    /// Parses the text of a spec: [`parse`](super::parse), compiled in the room of the spec, once for all that read it.
+    /// Parses the text of a spec: [`parse_named`](super::parse_named), compiled in the room of the spec, once for all that read it.
     ///
     /// # Errors
     /// As [`parse`](super::parse).

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 use zsim_base::geometry::Vector;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 
 /// Accepted scan rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
@@ -217,6 +217,6 @@ impl NamedSpec for LidarSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }

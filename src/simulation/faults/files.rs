@@ -1,7 +1,7 @@
 //! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse, text_file};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named, text_file};
 
 /// Maximum number of arrival times in a file: bounds the memory.
 const MAX_ARRIVALS: usize = 1_000_000;
@@ -57,7 +57,7 @@ impl NamedSpec for FaultsSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 
     fn resolved(self, source: &Source) -> Result<Self, SpecError> {

@@ -5,7 +5,7 @@ use crate::gains::AXES;
 use crate::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find_from, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find_from, parse_named};
 use zsim_dynamics::HeadSpec;
 use zsim_motion::Axis;
 
@@ -223,7 +223,7 @@ impl TimingMapsSpec {
             Extent::Quick => ("quick_study", &self.quick_study),
         };
         let of_study = find_from(Kind::Study, source, name)?;
-        let spec: SweepSpec = parse(&of_study)?;
+        let spec: SweepSpec = SweepSpec::parse(&of_study)?;
         match spec.base {
             BaseSpec::Journey { timing: Some(_), .. } => Ok((spec, of_study)),
             _ => Err(SpecError::about(source, key, format!("the study \"{name}\" has no `timing`"))),
@@ -248,7 +248,7 @@ impl RunsSpec {
     /// As [`ExperimentSpec::check`].
     pub(super) fn study(&self, extent: Extent, source: &Source) -> Result<(SweepSpec, Source), SpecError> {
         let of_study = find_from(Kind::Study, source, &self.study)?;
-        let mut spec: SweepSpec = parse(&of_study)?;
+        let mut spec: SweepSpec = SweepSpec::parse(&of_study)?;
         let wrong = |key: &str, message: String| Err(SpecError::about(source, key, message));
         let [AxisSpec::Levels { levels, .. }] = spec.axes.as_slice() else {
             return wrong("study", format!("the study \"{}\" does not have one axis with named levels", self.study));
@@ -346,6 +346,6 @@ impl NamedSpec for ExperimentSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }

@@ -3,7 +3,7 @@
 use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 
 /// A sweep: a base run, the parameters to vary, and the measures to report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -213,6 +213,6 @@ impl NamedSpec for SweepSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }

@@ -1,8 +1,8 @@
 //! Reading lists, tuples, structs, maps and enums from nodes.
 
-use super::failure::Failure;
+use super::failure::{Failure, not_a_variant, quoted};
 use super::node::{Entry, Kind, Node};
-use super::reader::{Read, Reader, Value, opening};
+use super::reader::{Read, Reader, Struct, Value, opening};
 use serde::de::{DeserializeSeed, EnumAccess, MapAccess, SeqAccess, VariantAccess, Visitor};
 use std::slice::Iter;
 
@@ -20,6 +20,8 @@ pub(super) struct Entries<'r, 'de> {
     entries: Iter<'de, Entry>,
     /// Name of the struct or variant, for errors.
     owner: &'de str,
+    /// All keys, for errors.
+    keys: Struct<'de>,
     /// Offset of the closing bracket.
     closing: u32,
     value: Option<Value<'r, 'de>>,
@@ -41,8 +43,9 @@ impl<'r, 'de> Value<'r, 'de> {
     }
 
     fn entries_of(&self, node: &'de Node, entries: &'de [Entry], owner: &'de str) -> Entries<'r, 'de> {
+        let keys = Struct { known: &[], entries };
         let entries = entries.iter();
-        Entries { reader: self.reader, entries, owner, closing: node.closing(), value: None, is_variant: false }
+        Entries { reader: self.reader, entries, owner, keys, closing: node.closing(), value: None, is_variant: false }
     }
 
     pub fn list(&self) -> Read<Items<'r, 'de>> {
@@ -83,9 +86,9 @@ impl<'r, 'de> Value<'r, 'de> {
     }
 
     /// The fields of the struct `name`, which can be left out.
-    pub fn fields(&self, name: &'static str) -> Read<Entries<'r, 'de>> {
+    pub fn fields(&self, name: &'static str, known: &'static [&'static str]) -> Read<Entries<'r, 'de>> {
         let node = self.without_name(name)?;
-        self.fields_of(node, name, opening)
+        Ok(self.fields_of(node, name, opening)?.of_known(known))
     }
 
     /// The fields in `group`; `expected` is the message if there are none.
@@ -102,7 +105,7 @@ impl<'r, 'de> Value<'r, 'de> {
     }
 
     /// A variant of the enum `name`: a bare name, or a name with fields; from JSON also a map with one key.
-    pub fn variant(&self, name: &'static str) -> Read<Variant<'r, 'de>> {
+    pub fn variant(&self, name: &'static str, known: &'static [&'static str]) -> Read<Variant<'r, 'de>> {
         let node = self.scalar()?;
         let (variant, content) = match &node.kind {
             Kind::Name(_) => (node, None),
@@ -112,7 +115,7 @@ impl<'r, 'de> Value<'r, 'de> {
                 [only] => (&only.0, Some(&only.1)),
                 _ => return Err(Failure::new("Expected a map with a single key, the name of a variant")),
             },
-            _ => return Err(Failure::new("Expected identifier")),
+            kind => return Err(Failure::new(not_a_variant(kind, name, known))),
         };
         self.reader.visit_variant(name, variant.start);
         Ok(Variant { reader: self.reader, name: variant, content })
@@ -161,9 +164,15 @@ impl<'de> SeqAccess<'de> for Items<'_, 'de> {
 }
 
 impl<'r, 'de> Entries<'r, 'de> {
+    /// The same entries, of a type that knows these keys.
+    fn of_known(mut self, known: &'static [&'static str]) -> Self {
+        self.keys.known = known;
+        self
+    }
+
     fn next_key(&mut self) -> Option<Value<'r, 'de>> {
         let Some((key, value)) = self.entries.next() else {
-            self.reader.visit_field(self.owner, self.closing);
+            self.reader.visit_end(self.owner, self.closing, self.keys);
             return None;
         };
         self.reader.visit_field(self.owner, key.start);
@@ -212,7 +221,11 @@ impl<'r, 'de> Variant<'r, 'de> {
         match self.content {
             None => Ok(()),
             Some(content) if content.is_json() => Value::new(self.reader, content).unit(""),
-            Some(content) => self.reader.fail(content.start, "Expected comma"),
+            Some(content) if matches!(&content.kind, Kind::Tuple(items) if items.is_empty()) => Ok(()),
+            Some(content) => {
+                let name = quoted(self.name.text().unwrap_or_default());
+                self.reader.fail(content.start, format!("{name} has no keys: write {name}"))
+            }
         }
     }
 
@@ -221,9 +234,10 @@ impl<'r, 'de> Variant<'r, 'de> {
         content.content(content.node)
     }
 
-    fn fields(&self) -> Read<Entries<'r, 'de>> {
+    fn fields(&self, known: &'static [&'static str]) -> Read<Entries<'r, 'de>> {
         let content = self.content()?;
-        content.fields_of(content.node, self.name.text().unwrap_or_default(), |_| opening(""))
+        let entries = content.fields_of(content.node, self.name.text().unwrap_or_default(), |_| opening(""))?;
+        Ok(entries.of_known(known))
     }
 }
 
@@ -252,7 +266,7 @@ impl<'de> VariantAccess<'de> for Variant<'_, 'de> {
         visitor.visit_seq(self.content()?.tuple(None, length)?)
     }
 
-    fn struct_variant<V: Visitor<'de>>(self, _: &'static [&'static str], visitor: V) -> Result<V::Value, Failure> {
-        visitor.visit_map(self.fields()?)
+    fn struct_variant<V: Visitor<'de>>(self, known: &'static [&'static str], visitor: V) -> Result<V::Value, Failure> {
+        visitor.visit_map(self.fields(known)?)
     }
 }

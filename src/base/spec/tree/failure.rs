@@ -1,5 +1,6 @@
 //! The error of reading a type from a tree, before its position is known.
 
+use super::node::Kind;
 use crate::similar::did_you_mean;
 use serde::de::{Error, Expected, Unexpected};
 use std::borrow::Cow;
@@ -35,6 +36,14 @@ impl Failure {
         }
     }
 
+    /// The key that the text does not have, the first of several, if this is the failure.
+    pub fn missing_key(&self) -> Option<&'static str> {
+        match &*self.0 {
+            Reason::MissingField(field) => Some(field),
+            _ => None,
+        }
+    }
+
     /// The message; `owner` is the struct and `enumeration` the enum that was read, or empty.
     pub fn message(&self, owner: &str, enumeration: &str) -> String {
         let inside = if owner.is_empty() { String::new() } else { format!(" in {}", quoted(owner)) };
@@ -52,7 +61,7 @@ impl Failure {
                 let similar = similar(found, expected);
                 format!("Unexpected {kind} named {}{inside}{similar}, {}", quoted(found), one_of(expected, "variants"))
             }
-            Reason::MissingField(field) => format!("Unexpected missing field named {}{inside}", quoted(field)),
+            Reason::MissingField(field) => needs(owner, &[field]),
             Reason::DuplicateField(field) => format!("Unexpected duplicate field named {}{inside}", quoted(field)),
         }
     }
@@ -118,6 +127,16 @@ fn similar(found: &str, expected: &[&str]) -> String {
     did_you_mean(found, expected.iter().copied()).map_or_else(String::new, |question| format!(" ({question})"))
 }
 
+/// The message that the struct or variant `owner` lacks these keys.
+pub fn needs(owner: &str, keys: &[&str]) -> String {
+    let subject = if owner.is_empty() { "the spec".to_owned() } else { quoted(owner) };
+    let names: Vec<String> = keys.iter().map(|key| quoted(key)).collect();
+    match names.split_last() {
+        Some((last, first)) if !first.is_empty() => format!("{subject} needs {} and {last}", first.join(", ")),
+        _ => format!("{subject} needs {}", names.concat()),
+    }
+}
+
 /// A found value in words.
 fn noun(found: Unexpected<'_>) -> String {
     match found {
@@ -134,6 +153,17 @@ fn noun(found: Unexpected<'_>) -> String {
         Unexpected::Map => "a map".to_owned(),
         Unexpected::Enum => "an enum".to_owned(),
         other => format!("a {other}"),
+    }
+}
+
+/// The message that a value of this kind is no variant of `enumeration`, which has the variants `known`.
+#[cold]
+pub(super) fn not_a_variant(kind: &Kind, enumeration: &str, known: &[&str]) -> String {
+    match kind {
+        Kind::String(text) if known.contains(&&**text) => {
+            format!("{} is a variant of {}: write it without quotes", quoted(text), quoted(enumeration))
+        }
+        _ => format!("No variant of enum {}, {}", quoted(enumeration), one_of(known, "variants")),
     }
 }
 

@@ -17,6 +17,7 @@ mod reader;
 mod scalars;
 
 use super::{Position, Source, SpecError};
+pub(super) use failure::needs;
 use header::Extensions;
 use node::Node;
 use parser::Parser;

@@ -2,8 +2,8 @@
 
 use super::failure::{Failure, quoted};
 use super::header::Extensions;
-use super::node::{FROM_JSON, Kind, Node};
-use crate::spec::{Position, Source, SpecError};
+use super::node::{Entry, FROM_JSON, Kind, Node};
+use crate::spec::{Missing, Position, Source, SpecError};
 use std::cell::Cell;
 
 /// A result of reading part of a tree.
@@ -24,12 +24,24 @@ pub(super) struct Reader<'de> {
     owner: Cell<&'de str>,
     /// Name of the enum, if the last place is the name of a variant.
     enumeration: Cell<&'static str>,
+    /// The last struct or variant of which all keys have been read.
+    complete: Cell<Struct<'de>>,
+}
+
+/// The keys of a struct or variant.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Struct<'de> {
+    /// Keys that the type knows.
+    pub known: &'static [&'static str],
+    /// Keys and values of the text.
+    pub entries: &'de [Entry],
 }
 
 impl<'de> Reader<'de> {
     /// A reader of a tree from `source`.
     pub fn new(source: &'de Source, extensions: Extensions) -> Self {
-        Self { source, extensions, at: Cell::new(FROM_JSON), owner: Cell::new(""), enumeration: Cell::new("") }
+        let (at, owner, enumeration) = (Cell::new(FROM_JSON), Cell::new(""), Cell::new(""));
+        Self { source, extensions, at, owner, enumeration, complete: Cell::default() }
     }
 
     /// Records that the place at the offset `at` is read.
@@ -42,6 +54,12 @@ impl<'de> Reader<'de> {
     pub fn visit_field(&self, owner: &'de str, at: u32) {
         self.visit(at);
         self.owner.set(owner);
+    }
+
+    /// As [`Reader::visit_field`], for the end of the fields of `owner`.
+    pub fn visit_end(&self, owner: &'de str, at: u32, complete: Struct<'de>) {
+        self.visit_field(owner, at);
+        self.complete.set(complete);
     }
 
     /// As [`Reader::visit`], for the name of a variant of `enumeration`.
@@ -66,7 +84,15 @@ impl<'de> Reader<'de> {
             FROM_JSON => SpecError::plain(&source.name, message),
             at => SpecError::at(source, Position::of_offset(&source.text, at as usize), message),
         };
-        error.with_unknown_key(failure.unknown_key())
+        let missing = failure.missing_key().map(|key| self.missing(key));
+        error.with_unknown_key(failure.unknown_key()).with_missing(missing)
+    }
+
+    /// What is known of the keys that the last struct lacks; `key` is the first.
+    fn missing(&self, key: &'static str) -> Missing {
+        let Struct { known, entries } = self.complete.get();
+        let present = entries.iter().filter_map(|(key, _)| key.text()).map(str::to_owned).collect();
+        Missing { owner: self.owner.get().to_owned(), key, known, present }
     }
 
     /// The value in brackets that contain no other; JSON has no such brackets.

@@ -4,7 +4,7 @@ use super::super::Shake;
 use super::limits::BuildLimitsSpec;
 use crate::sweep::{GoalSpec, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 use zsim_elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
 
 /// A search for a spring: design space, goals and limits.
@@ -149,6 +149,6 @@ impl NamedSpec for DesignSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse(source)
+        parse_named(source)
     }
 }

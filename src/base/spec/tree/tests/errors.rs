@@ -69,14 +69,14 @@ fn a_value_of_another_type_is_an_error_at_the_value() {
             "Unexpected field named `modes` in `Spec` (did you mean mode?), expected one of `mode`, `size_m`, or `names` instead",
         ),
         ("(mode: slow, mode: slow)", 14, "Unexpected duplicate field named `mode` in `Spec`"),
-        ("(size_m: (1, 2),\n)", 1, "Unexpected missing field named `mode` in `Spec`"),
-        ("(mode: fast(gain: 1))", 20, "Unexpected missing field named `on` in `fast`"),
+        ("(size_m: (1, 2),\n)", 1, "`Spec` needs `mode`"),
+        ("(mode: fast(gain: 1))", 20, "`fast` needs `on`"),
         (
             "(mode: fast(gain: 1, off: true))",
             22,
             "Unexpected field named `off` in `fast`, expected either `gain` or `on` instead",
         ),
-        ("(mode: named((few: 1, many: 2)))", 30, "Unexpected missing field named `signed` in `Counts`"),
+        ("(mode: named((few: 1, many: 2)))", 30, "`Counts` needs `signed`"),
         (
             "(mode: named((few: 1, many: 2, signed: 3)), lost: 1)",
             45,
@@ -85,7 +85,11 @@ fn a_value_of_another_type_is_an_error_at_the_value() {
         ("(mode: fast(gain: \"1\", on: true))", 19, "Expected float"),
         ("(mode: fast(gain: 1, on: 1))", 26, "Expected boolean"),
         ("(mode: fast)", 12, "Expected opening `(`"),
-        ("(mode: slow(1))", 12, "Expected comma"),
+        ("(mode: slow(1))", 12, "`slow` has no keys: write `slow`"),
+        ("(mode: slow(gain: 1))", 12, "`slow` has no keys: write `slow`"),
+        ("(mode: ())", 8, "No variant of enum `Mode`, expected one of `slow`, `fast`, or `named` instead"),
+        ("(mode: \"slo\")", 8, "No variant of enum `Mode`, expected one of `slow`, `fast`, or `named` instead"),
+        ("(mode: \"slow\")", 8, "`slow` is a variant of `Mode`: write it without quotes"),
         ("(mode: named(3))", 14, "Expected opening `(` for struct `Counts`"),
         ("(mode: slow, names: \"a\")", 21, "Expected opening `[`"),
         ("(mode: slow, names: [1])", 22, "Expected string"),
@@ -100,6 +104,12 @@ fn a_value_of_another_type_is_an_error_at_the_value() {
         let line = text.lines().count();
         assert_eq!(error.line_and_column(), Some((line, column)), "{error}");
     }
+}
+
+#[test]
+fn a_variant_without_keys_may_have_empty_brackets() {
+    let spec = read::<Spec>("(mode: slow(), size_m: (1, 2))").unwrap();
+    assert!(matches!(spec.mode, Mode::Slow), "{spec:?}");
 }
 
 #[test]
