@@ -65,6 +65,7 @@ mod cloud;
 mod coasting;
 mod consider;
 mod dead_reckoning;
+mod defaults;
 mod error;
 mod estimator;
 mod gaps;

@@ -2,11 +2,12 @@ pub use super::surfel_spec::{MatchingSpec, SurfelSpec};
 
 use super::{EstimationError, RegistrationSpec};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named};
+use zsim_base::spec::{Kind, SpecError};
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct EstimatorSpec {
     /// Length of the sliding window, s. A longer window uses more matches and takes longer to solve.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -57,6 +58,7 @@ pub enum Formulation {
 /// Solution of a window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct SolveSpec {
     /// Maximum number of iterations: match, then solve.
     pub max_iterations: usize,
@@ -90,6 +92,7 @@ pub struct SolveSpec {
 /// IMU errors in addition to the calibrated noise, gaps, and initial rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct InertialSpec {
     /// Factor on the calibrated noise densities; accounts for errors that are not white.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -119,6 +122,7 @@ pub struct InertialSpec {
 /// Clock offset between IMU and lidar.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct ClockSpec {
     /// Whether clock offset and rate are estimated; if not, the offset is `start_s`.
     pub estimated: bool,
@@ -139,6 +143,7 @@ pub struct ClockSpec {
 /// Uncertainty of the lidar extrinsics (lidar to IMU).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct ExtrinsicsSpec {
     /// Whether rotation and translation are estimated; if not, they are as calibrated.
     pub estimated: bool,
@@ -160,6 +165,7 @@ impl ExtrinsicsSpec {
 /// Selection of fixed views (keyframes).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct ViewSpec {
     /// Duration of a view, s; at least `step_s`.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -226,15 +232,6 @@ impl EstimatorSpec {
         require(self.views.max_kept >= self.fixed_views, "max_kept", "must be at least fixed_views".into())?;
         require(self.views.length_s >= step, "length_s", format!("must be at least step_s = {step} s"))?;
         self.registration.check()
-    }
-}
-
-impl NamedSpec for EstimatorSpec {
-    const KIND: Kind = Kind::Estimator;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
     }
 }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Surfel extraction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct SurfelSpec {
     /// Edge length of the finest voxels, m.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -61,6 +62,7 @@ pub struct SurfelSpec {
 /// Additional surfels where the geometry is weak, as along a corridor or on stairs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct FineSurfelSpec {
     /// While the conditioning of the last windows is below this, surfels are also built of voxels of half the finest edge;
     /// 0 for never.
@@ -70,15 +72,10 @@ pub struct FineSurfelSpec {
     pub min_points: usize,
 }
 
-impl Default for FineSurfelSpec {
-    fn default() -> Self {
-        Self { below_conditioning: 0.03, min_points: 10 }
-    }
-}
-
 /// Surfel matching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct MatchingSpec {
     /// Number of nearest neighbours searched for each surfel, at least 1.
     pub neighbours: usize,

@@ -204,7 +204,8 @@ pub struct KindByKeys {
     pub has_all: bool,
 }
 
-fn built_in(kind: Kind, file: &str) -> Option<Source> {
+/// The spec in the binary with the file name `file`, such as `default.ron`.
+pub fn built_in(kind: Kind, file: &str) -> Option<Source> {
     let inside = folder_in_binary(kind)?.files().find(|entry| file_name(entry) == Some(file))?;
     let name = format!("{}/{file} (built in)", kind.folder());
     Some(Source::in_memory(name, inside.contents_utf8()?))

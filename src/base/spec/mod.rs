@@ -17,7 +17,9 @@ mod writer;
 
 pub use crate::unit::split_unit;
 pub use error::SpecError;
-pub use library::{Kind, KindByKeys, MAX_SPEC_BYTES, find, find_from, kind_by_keys, name_from, names, text_file};
+pub use library::{
+    Kind, KindByKeys, MAX_SPEC_BYTES, built_in, find, find_from, kind_by_keys, name_from, names, text_file,
+};
 pub use named::{Named, NamedSpec};
 pub use position::Position;
 pub use source::Source;
@@ -33,9 +35,18 @@ use serde::de::DeserializeOwned;
 /// # Errors
 /// A [`SpecError`] with line and column for invalid syntax, unknown or missing keys, and numbers out of range.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, SpecError> {
-    let tree = Tree::read(source)?;
+    parse_over(source, None)
+}
+
+/// Parses the text of a spec; keys that it does not have are those of `defaults`, in nested structs too.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_over<T: DeserializeOwned>(source: &Source, defaults: Option<&Tree>) -> Result<T, SpecError> {
+    let own = Tree::read(source)?;
+    let keys = own.keys();
+    let tree = defaults.into_iter().fold(own, Tree::completed_from);
     tree.to().map_err(|error: SpecError| {
-        let keys = tree.keys();
         // The error of a nested key says nothing about the kind.
         let is_outermost = error.unknown_key().is_some_and(|key| keys.iter().any(|outermost| outermost == key));
         match is_outermost.then(|| kind_by_keys(&keys)).flatten() {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Global registration (loop-closed trajectory) settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct RegistrationSpec {
     /// Spacing of the knots of the correction spline, s.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -24,6 +25,7 @@ pub struct RegistrationSpec {
     /// Number of points from which on a surfel has its full weight; with fewer, its variance along the normal counts in
     /// inverse proportion to the number. 0: all have their full weight.
     #[serde(default)]
+    #[schemars(default = "usual_full_weight_points")]
     pub full_weight_points: usize,
     /// Maximum duration of a surfel, s; points of a cell that span more are split.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -93,6 +95,11 @@ pub struct RegistrationSpec {
     pub min_seen_again: f64,
     /// Loop closure by place recognition.
     pub places: PlacesSpec,
+}
+
+/// The default; recordings without the key are from before it existed, and their surfels had full weight.
+fn usual_full_weight_points() -> usize {
+    RegistrationSpec::default().full_weight_points
 }
 
 impl RegistrationSpec {

@@ -63,6 +63,15 @@ impl Tree {
         Self { source: Source::in_memory(name, ""), extensions: Extensions::default(), root: value.into() }
     }
 
+    /// The same tree with the keys of `other` that it does not have, in the structs inside too.
+    ///
+    /// `other` must be right: an error about one of its values has a place in this text.
+    #[must_use]
+    pub fn completed_from(mut self, other: &Tree) -> Self {
+        self.root.complete_from(&other.root);
+        self
+    }
+
     /// Reads the tree as `T`.
     ///
     /// # Errors

@@ -105,4 +105,37 @@ impl Node {
             _ => None,
         }
     }
+
+    /// Adds the fields of `other` that this struct does not have, and of the structs in it.
+    pub fn complete_from(&mut self, other: &Node) {
+        let Some(others) = other.fields() else { return };
+        if matches!(&self.kind, Kind::Tuple(items) if items.is_empty()) {
+            self.kind = Kind::Struct(Box::default());
+        }
+        match &mut self.kind {
+            Kind::Struct(entries) => complete(entries, others),
+            Kind::Named(named) => named.1.complete_from(other),
+            _ => {}
+        }
+    }
+
+    /// The fields of a struct, with or without its name.
+    fn fields(&self) -> Option<&[Entry]> {
+        match &self.kind {
+            Kind::Struct(entries) => Some(entries),
+            Kind::Named(named) => named.1.fields(),
+            _ => None,
+        }
+    }
+}
+
+fn complete(entries: &mut Box<[Entry]>, others: &[Entry]) {
+    let mut all = std::mem::take(entries).into_vec();
+    for (key, value) in others {
+        match all.iter_mut().find(|(own, _)| own.text() == key.text()) {
+            Some((_, own)) => own.complete_from(value),
+            None => all.push((key.clone(), value.clone())),
+        }
+    }
+    *entries = all.into_boxed_slice();
 }

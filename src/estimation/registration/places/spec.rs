@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 /// Loop closure by place recognition, for drift beyond the matching distance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(default)]
 pub struct PlacesSpec {
     /// Enables loop closure.
     pub recognised: bool,
