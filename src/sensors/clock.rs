@@ -7,26 +7,28 @@ use zsim_base::time::{Span, Stamp};
 #[serde(deny_unknown_fields)]
 pub struct ClocksSpec {
     /// Clock of the lidar. Trajectories are written in lidar time.
+    #[serde(default)]
     pub lidar: ClockSpec,
     /// Clock of the IMU.
+    #[serde(default)]
     pub imu: ClockSpec,
 }
 
-/// Error model of a sensor clock relative to true time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+/// Error model of a sensor clock relative to true time; without keys an exact clock.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClockSpec {
     /// Offset at the start of the run, ms; positive is ahead of true time.
-    #[serde(with = "checked::Finite")]
+    #[serde(default, with = "checked::Finite")]
     pub offset_ms: f64,
     /// Rate error, ppm; positive runs fast (1 ms per minute is 16.67 ppm).
-    #[serde(with = "checked::Finite")]
+    #[serde(default, with = "checked::Finite")]
     pub rate_ppm: f64,
     /// Jitter: standard deviation of the white noise on a stamp, ms.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub jitter_ms: f64,
     /// Resolution, ms: stamps are rounded down to a multiple of it; 0 disables the rounding.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub resolution_ms: f64,
 }
 
@@ -172,7 +174,7 @@ impl NamedSpec for ClocksSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zsim_base::spec::{Kind, find, parse};
+    use zsim_base::spec::{Kind, find};
 
     fn clock(offset_ms: f64, rate_ppm: f64, resolution_ms: f64) -> Clock {
         let spec = ClockSpec { offset_ms, rate_ppm, jitter_ms: 0.0, resolution_ms };

@@ -29,8 +29,8 @@ pub use imu::{
     WarmUpSpec, coning_corrected, ideal_reading,
 };
 pub use lidar::{
-    Beam, BeamModel, DetectionSpec, GlassSpec, GrazingSpec, Lidar, LidarErrors, LidarErrorsSpec, LidarSpec,
-    PatternSpec, RangeNoiseSpec, ScanTiming, Sweep, Switch,
+    Beam, BeamModel, DetectionSpec, FarRange, GlassSpec, GrazingSpec, Lidar, LidarErrors, LidarErrorsSpec, LidarSpec,
+    PatternSpec, RangeNoiseSpec, RangeSigma, ScanTiming, Sweep, Switch,
 };
 pub use scenery::{CanopyPart, Scenery, SurfaceHit};
 pub use stamper::Stamper;

@@ -31,7 +31,7 @@ pub struct ImuSpec {
     pub rate_hz: f64,
     /// Delay of the stamp after the middle of that period, ms. Half a period puts the stamp at the end of the period; a
     /// driver that corrects for it has a smaller value, a filter or a buffer a larger one. The clock offset adds to it.
-    #[serde(with = "checked::Finite")]
+    #[serde(default, with = "checked::Finite")]
     pub stamp_delay_ms: f64,
     /// How a sample is derived from the motion during its period.
     #[serde(default)]
@@ -89,10 +89,10 @@ pub struct GyroSpec {
     #[serde(with = "checked::NonNegative")]
     pub density_deg_per_s_per_sqrt_hz: f64,
     /// Standard deviation of the turn-on bias, deg/s.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub turn_on_bias_deg_per_s: f64,
     /// Random walk of the bias, rad/s/sqrt(s).
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub bias_walk_rad_per_s_per_sqrt_s: f64,
     /// Bias instability (in-run stability), deg/h: flicker noise with an Allan deviation of 0.664 times this value.
     #[serde(default, with = "checked::NonNegative")]
@@ -103,16 +103,16 @@ pub struct GyroSpec {
     #[serde(default, with = "checked::NonNegative")]
     pub bias_deg_per_s_per_k: f64,
     /// Standard deviation of the scale error, per cent.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub scale_percent: f64,
     /// Standard deviation of the misalignment of each axis towards each other axis, degrees.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub misalignment_deg: f64,
     /// Measurement range per axis, deg/s; larger rates saturate.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::limit_deg_per_s", with = "checked::Positive")]
     pub limit_deg_per_s: f64,
     /// Resolution, deg/s: rates are rounded to a multiple of it; 0 disables the rounding.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub resolution_deg_per_s: f64,
 }
 
@@ -124,10 +124,10 @@ pub struct AccelSpec {
     #[serde(with = "checked::NonNegative")]
     pub density_ug_per_sqrt_hz: f64,
     /// Standard deviation of the turn-on bias, mg.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub turn_on_bias_mg: f64,
     /// Random walk of the bias, m/s^2/sqrt(s).
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub bias_walk_m_per_s2_per_sqrt_s: f64,
     /// Bias instability (in-run stability), mg: flicker noise with an Allan deviation of 0.664 times this value.
     #[serde(default, with = "checked::NonNegative")]
@@ -138,16 +138,16 @@ pub struct AccelSpec {
     #[serde(default, with = "checked::NonNegative")]
     pub bias_mg_per_k: f64,
     /// Standard deviation of the scale error, per cent.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub scale_percent: f64,
     /// Standard deviation of the misalignment of each axis towards each other axis, degrees.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub misalignment_deg: f64,
     /// Measurement range per axis, g; larger specific forces saturate.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::limit_g", with = "checked::Positive")]
     pub limit_g: f64,
     /// Resolution, mg: specific forces are rounded to a multiple of it; 0 disables the rounding.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub resolution_mg: f64,
 }
 
@@ -161,6 +161,17 @@ pub struct GaussMarkovSpec {
     /// Correlation time, s: the autocorrelation decays by 1/e.
     #[serde(with = "checked::Positive")]
     pub time_s: f64,
+}
+
+/// The values of keys that are omitted: ranges of ordinary MEMS, as in `specs/imus/unknown.ron`.
+mod usual {
+    pub fn limit_deg_per_s() -> f64 {
+        2000.0
+    }
+
+    pub fn limit_g() -> f64 {
+        16.0
+    }
 }
 
 impl ImuSpec {

@@ -14,7 +14,10 @@ mod sweep;
 
 pub use errors::LidarErrors;
 pub use pattern::{Beam, PatternSpec};
-pub use spec::{BeamModel, DetectionSpec, GlassSpec, GrazingSpec, LidarErrorsSpec, LidarSpec, RangeNoiseSpec, Switch};
+pub use spec::{
+    BeamModel, DetectionSpec, FarRange, GlassSpec, GrazingSpec, LidarErrorsSpec, LidarSpec, RangeNoiseSpec, RangeSigma,
+    Switch,
+};
 pub use sweep::{ScanTiming, Sweep};
 
 use pattern::{Pattern, Plane};
@@ -93,12 +96,6 @@ impl Lidar {
 
     /// Range noise for an estimator: as in the spec, also if the errors are switched off.
     pub fn noise(&self) -> LidarNoise {
-        let range = &self.spec.errors.range;
-        LidarNoise {
-            near_sigma_m: range.near_sigma_m,
-            near_m: range.near_m,
-            far_sigma_m: range.far_sigma_m,
-            far_m: range.far_m,
-        }
+        self.spec.range_noise()
     }
 }

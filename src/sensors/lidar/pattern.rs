@@ -20,8 +20,10 @@ pub enum PatternSpec {
         /// Azimuth step between beams, degrees.
         #[serde(with = "checked::Positive")]
         step_deg: f64,
-        /// Number of beams that would fill a full turn, blind sector included. It determines the time between beams.
-        slots_per_turn: u32,
+        /// Number of beams that would fill a full turn, blind sector included. It determines the time between beams. By
+        /// default 360 degrees over `step_deg`.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        slots_per_turn: Option<u32>,
     },
     /// Channels at fixed elevations that rotate clockwise (seen from above) from azimuth 0, one turn per scan.
     Spinning {
@@ -46,8 +48,10 @@ pub enum PatternSpec {
         /// steps from each other.
         #[serde(with = "checked::Positive")]
         step_deg: f64,
-        /// Number of beams of one mirror turn that would fill a full turn, blind sector included.
-        slots_per_turn: u32,
+        /// Number of beams of one mirror turn that would fill a full turn, blind sector included. By default 360 degrees over
+        /// the step between beams of one mirror turn.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        slots_per_turn: Option<u32>,
         /// Mirror turns per scan.
         mirror_turns: u32,
     },
@@ -95,6 +99,7 @@ impl PatternSpec {
         let unrotated = |beams| Pattern { beams, plane: None, turns_per_scan: 0.0 };
         match self {
             &Self::Planar { beams, first_deg, step_deg, slots_per_turn } => {
+                let slots_per_turn = slots_per_turn.unwrap_or_else(|| steps_per_turn(step_deg));
                 if beams == 0 || beams > slots_per_turn || beams as usize > MAX_BEAMS {
                     let message = format!("{beams} beams in {slots_per_turn} slots a turn: give 1 to {slots_per_turn}");
                     return Err(SpecError::about(source, "beams", message));
@@ -112,6 +117,8 @@ impl PatternSpec {
                 Ok(unrotated(spinning(elevations_deg, channel_s, round_s, rate_hz, source)?))
             }
             &Self::Interlaced { beams, first_deg, step_deg, slots_per_turn, mirror_turns } => {
+                let slots_per_turn =
+                    slots_per_turn.unwrap_or_else(|| steps_per_turn(step_deg * f64::from(mirror_turns)));
                 let (first_rad, step_rad) = (first_deg.to_radians(), step_deg.to_radians());
                 let interlaced = Interlaced { beams, first_rad, step_rad, slots_per_turn, mirror_turns };
                 Ok(unrotated(interlaced.beams(rate_hz, source)?))
@@ -129,6 +136,11 @@ impl Plane {
         let azimuth = self.angle_min_rad + f64::from(k) * self.angle_increment_rad;
         Beam::new(azimuth, 0.0, f64::from(k) * self.time_increment_s)
     }
+}
+
+/// Number of steps of `step_deg` that fill a turn.
+fn steps_per_turn(step_deg: f64) -> u32 {
+    (360.0 / step_deg).round() as u32
 }
 
 fn spinning(
@@ -174,7 +186,8 @@ mod tests {
 
     #[test]
     fn the_beams_of_a_utm30lx_run_from_minus_135_to_135_degrees_in_18_75_ms() {
-        let pattern = PatternSpec::Planar { beams: 1081, first_deg: -135.0, step_deg: 0.25, slots_per_turn: 1440 };
+        let pattern =
+            PatternSpec::Planar { beams: 1081, first_deg: -135.0, step_deg: 0.25, slots_per_turn: Some(1440) };
         let Pattern { beams, plane, .. } = pattern.build(40.0, &source()).unwrap();
         let (first, last) = (beams[0], beams[1080]);
         assert_relative_eq!(
@@ -194,7 +207,7 @@ mod tests {
 
     #[test]
     fn more_beams_than_slots_are_rejected_with_their_position() {
-        let pattern = PatternSpec::Planar { beams: 1441, first_deg: 0.0, step_deg: 0.25, slots_per_turn: 1440 };
+        let pattern = PatternSpec::Planar { beams: 1441, first_deg: 0.0, step_deg: 0.25, slots_per_turn: Some(1440) };
         assert_eq!(pattern.build(40.0, &source()).unwrap_err().line_and_column(), Some((3, 2)));
     }
 

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 use zsim_base::geometry::Vector;
+use zsim_base::measurement::LidarNoise;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 
 /// Accepted scan rates, Hz.
@@ -20,45 +21,50 @@ pub struct LidarSpec {
     #[serde(with = "checked::Positive")]
     pub rate_hz: f64,
     /// Minimum reported range, m. Nearer echoes are reported as too near.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default = "usual::range_min_m", with = "checked::NonNegative")]
     pub range_min_m: f64,
     /// Maximum reported range, m. Rays end there.
     #[serde(with = "checked::Positive")]
     pub range_max_m: f64,
     /// Number of rays that represent a beam.
+    #[serde(default)]
     pub beam: BeamModel,
     /// Half-angle of the beam divergence at 1/e^2 of the intensity, mrad. A larger value gives more mixed pixels.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub divergence_half_angle_mrad: f64,
     /// Pulse length, m: echoes of one beam within this distance merge into a mixed pixel.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub pulse_length_m: f64,
     /// Maximum number of reported echoes per beam, strongest first; 1..=7.
+    #[serde(default = "usual::echoes")]
     pub echoes: u8,
     /// Intensity of the echo of a white surface at 1 m and normal incidence.
     #[serde(with = "checked::NonNegative")]
     pub intensity_at_1_m: f64,
     /// Whether the errors below are applied.
+    #[serde(default)]
     pub noise: Switch,
     /// Range errors.
     pub errors: LidarErrorsSpec,
 }
 
 /// Number of rays that represent a beam.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BeamModel {
     /// One ray: no mixed pixels.
+    #[default]
     Single,
     /// Seven rays over the cross-section of the beam: mixed pixels at edges, several echoes.
     Divergent,
 }
 
 /// On or off.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Switch {
     /// On.
+    #[default]
     On,
     /// Off.
     Off,
@@ -73,8 +79,10 @@ pub struct LidarErrorsSpec {
     /// Detection threshold, and range bias of weak echoes.
     pub detection: DetectionSpec,
     /// Range bias at grazing incidence.
+    #[serde(default)]
     pub grazing: GrazingSpec,
     /// Reflection and delay by glass.
+    #[serde(default)]
     pub glass: GlassSpec,
 }
 
@@ -82,25 +90,35 @@ pub struct LidarErrorsSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RangeNoiseSpec {
-    /// Standard deviation up to `near_m`, m.
+    /// Standard deviation up to `near_m`, m; at all ranges without the keys of the far range.
     #[serde(with = "checked::NonNegative")]
     pub near_sigma_m: f64,
     /// Range up to which `near_sigma_m` applies, m.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub near_m: f64,
-    /// Standard deviation at `far_m`, m; linear in range between `near_m` and `far_m`.
-    #[serde(with = "checked::NonNegative")]
-    pub far_sigma_m: f64,
-    /// Range at which `far_sigma_m` applies, m.
-    #[serde(with = "checked::Positive")]
-    pub far_m: f64,
+    /// Standard deviation at `far_m`, m; linear in range beyond `near_m`. By default that up to `near_m`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub far_sigma_m: Option<RangeSigma>,
+    /// Range at which `far_sigma_m` applies, m; `range_max_m` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub far_m: Option<FarRange>,
     /// Standard deviation over runs of a bias that is constant within a run, m.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub bias_sigma_m: f64,
     /// Resolution, m: ranges are rounded to a multiple of it; 0 disables the rounding.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub resolution_m: f64,
 }
+
+/// A standard deviation, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(transparent)]
+pub struct RangeSigma(#[serde(with = "checked::NonNegative")] pub f64);
+
+/// A range above zero, m.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(transparent)]
+pub struct FarRange(#[serde(with = "checked::Positive")] pub f64);
 
 /// Detection of echoes. The power of an echo is `reflectance cos(incidence) / range^2`, for a Lambertian surface wider
 /// than the beam; the detection probability is logistic in the logarithm of the power.
@@ -115,12 +133,12 @@ pub struct DetectionSpec {
     #[serde(with = "checked::Positive")]
     pub softness: f64,
     /// Range bias of an echo at the threshold, m, positive for too long; inversely proportional to the power.
-    #[serde(with = "checked::Finite")]
+    #[serde(default, with = "checked::Finite")]
     pub weak_bias_m: f64,
 }
 
-/// Range bias at grazing incidence.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+/// Range bias at grazing incidence; none by default.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GrazingSpec {
     /// Angle of incidence above which ranges are biased, degrees from the normal.
@@ -131,8 +149,8 @@ pub struct GrazingSpec {
     pub bias_m: f64,
 }
 
-/// Effects of glass, in addition to the attenuation by transmission in both directions.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+/// Effects of glass, in addition to the attenuation by transmission in both directions; none by default.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GlassSpec {
     /// Fraction of beams that the glass itself reflects at normal incidence; proportional to the cosine of incidence.
@@ -143,7 +161,29 @@ pub struct GlassSpec {
     pub delay_m: f64,
 }
 
+/// The values of keys that are omitted.
+mod usual {
+    pub fn range_min_m() -> f64 {
+        0.1
+    }
+
+    pub fn echoes() -> u8 {
+        1
+    }
+}
+
 impl LidarSpec {
+    /// Range noise.
+    pub(super) fn range_noise(&self) -> LidarNoise {
+        let RangeNoiseSpec { near_sigma_m, near_m, far_sigma_m, far_m, .. } = self.errors.range;
+        LidarNoise {
+            near_sigma_m,
+            near_m,
+            far_sigma_m: far_sigma_m.map_or(near_sigma_m, |sigma| sigma.0),
+            far_m: far_m.map_or(self.range_max_m, |range| range.0),
+        }
+    }
+
     /// Checks the relations between fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
         let refuse = |key: &str, message: String| Err(SpecError::about(source, key, message));
@@ -155,9 +195,9 @@ impl LidarSpec {
             let message = format!("range_min_m {} is not below range_max_m {}", self.range_min_m, self.range_max_m);
             return refuse("range_min_m", message);
         }
-        let range = &self.errors.range;
-        if range.near_m >= range.far_m {
-            return refuse("near_m", format!("near_m {} is not below far_m {}", range.near_m, range.far_m));
+        let LidarNoise { near_m, far_m, .. } = self.range_noise();
+        if near_m >= far_m {
+            return refuse("near_m", format!("near_m {near_m} is not below far_m {far_m}"));
         }
         if !(1..=7).contains(&self.echoes) {
             return refuse("echoes", format!("{} echoes a beam; give 1 to 7", self.echoes));
