@@ -16,12 +16,12 @@ pub struct MotorSpec {
     #[serde(with = "FiniteArray::<3>")]
     pub axis_in_head: [f64; 3],
     /// A point on the rotation axis, in the head frame, m.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub pivot_in_head_m: [f64; 3],
     /// Motion of the motor: continuous rotation or a sine.
     pub turn: TurnSpec,
     /// Time at rest before the motor starts, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Time over which the motion then builds up to the full rate or amplitude, s.
     #[serde(with = "Positive")]

@@ -22,7 +22,12 @@ impl Body {
     /// # Errors
     /// When there is no part, or the inertia of a part is physically impossible.
     pub(super) fn of(spec: &HeadSpec, source: &Source) -> Result<Self, SpecError> {
-        let bodies = spec.parts.iter().map(|part| body_of(part, source)).collect::<Result<Vec<_>, _>>()?;
+        let bodies = spec
+            .parts
+            .iter()
+            .enumerate()
+            .map(|(index, part)| body_of(index, part, source))
+            .collect::<Result<Vec<_>, _>>()?;
         if bodies.is_empty() {
             return Err(SpecError::about(source, "parts", "the head has no parts: give at least one"));
         }
@@ -54,7 +59,7 @@ impl Body {
     }
 }
 
-fn body_of(part: &PartSpec, source: &Source) -> Result<Body, SpecError> {
+fn body_of(index: usize, part: &PartSpec, source: &Source) -> Result<Body, SpecError> {
     match part {
         PartSpec::Block { mass_kg, size_m, centre_m, .. } => {
             let [x2, y2, z2] = size_m.map(|edge| edge * edge);
@@ -70,6 +75,7 @@ fn body_of(part: &PartSpec, source: &Source) -> Result<Body, SpecError> {
             let principal = inertia.symmetric_eigenvalues();
             // Each principal moment of a rigid body is positive and at most the sum of the other two.
             if principal.min() <= 0.0 || 2.0 * principal.max() > principal.sum() * (1.0 + 1e-9) {
+                let name = name.clone().unwrap_or_else(|| format!("part {}", index + 1));
                 let [a, b, c] = [principal.x, principal.y, principal.z];
                 let message = format!(
                     "the inertia of \"{name}\" is physically impossible: the principal moments are {a:.3e}, {b:.3e} and \

@@ -27,8 +27,10 @@ pub struct SpringElementSpec {
     /// The spring: a coil, a stiffness matrix, or the name of a spring spec.
     pub spring: SpringSpec,
     /// Number of segments that model large deflections, 1 to 64; 1 is fastest.
+    #[serde(default = "crate::usual::segments")]
     pub segments: usize,
     /// Pose of the spring's foot in the base; z points along the spring.
+    #[serde(default)]
     pub base_from_spring: PlacementSpec,
     /// Pose of the spring's top in the head.
     pub head_from_spring: PlacementSpec,
@@ -82,7 +84,7 @@ pub struct CableSpec {
     #[serde(with = "checked::Positive")]
     pub stiffness_n_per_m: f64,
     /// Axial damping while the cable is taut, N s/m.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub damping_n_s_per_m: f64,
 }
 
@@ -102,7 +104,7 @@ pub struct CordSpec {
     /// Axial stiffness of the cord, as N/m or as E A.
     pub stiffness: CordStiffnessSpec,
     /// Axial damping while the cord is taut, N s/m.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub damping_n_s_per_m: f64,
 }
 
@@ -139,16 +141,16 @@ pub struct FloatSpec {
     #[serde(with = "checked::Positive")]
     pub density_kg_per_m3: f64,
     /// Linear drag coefficient at the cylinder's centre, N s/m.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub drag_n_s_per_m: f64,
     /// Quadratic drag coefficient at the cylinder's centre, N s^2/m^2.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub drag_n_s2_per_m2: f64,
     /// Linear rotational drag coefficient, N m s/rad.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub drag_nm_s_per_rad: f64,
     /// Added mass: fluid that moves with the cylinder, acting at the cylinder's centre, kg.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub added_mass_kg: f64,
 }
 

@@ -33,6 +33,7 @@ mod response;
 mod simulation;
 mod spec;
 mod statics;
+mod usual;
 
 pub use actuated::{MotorSpec, TurnSpec};
 pub use body::Body;

@@ -7,12 +7,12 @@ use zsim_base::geometry::Vector;
 use zsim_base::geometry::from_roll_pitch_yaw;
 use zsim_base::spec::checked;
 
-/// The pose of a frame in another frame.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
+/// The pose of a frame in another frame; without keys the frames coincide.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlacementSpec {
     /// Origin of the frame, m.
-    #[serde(with = "checked::FiniteArray::<3>")]
+    #[serde(default, with = "checked::FiniteArray::<3>")]
     pub position_m: [f64; 3],
     /// Roll, pitch and yaw (about fixed x, then y, then z), degrees.
     #[serde(default, with = "checked::FiniteArray::<3>")]

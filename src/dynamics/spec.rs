@@ -18,6 +18,7 @@ pub struct HeadSpec {
     /// Rigid parts of the head: sensors, brackets, plates.
     pub parts: Vec<PartSpec>,
     /// Pose of the lidar in the head.
+    #[serde(default)]
     pub head_from_laser: PlacementSpec,
     /// Pose of the IMU in the head.
     pub head_from_imu: PlacementSpec,
@@ -77,8 +78,9 @@ impl HeadSpec {
 pub enum PartSpec {
     /// A homogeneous block with edges parallel to the head's axes.
     Block {
-        /// Name of the part.
-        name: String,
+        /// Name of the part; its number by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
         /// Mass, kg.
         #[serde(with = "checked::Positive")]
         mass_kg: f64,
@@ -91,8 +93,9 @@ pub enum PartSpec {
     },
     /// A body with given mass properties.
     Body {
-        /// Name of the part.
-        name: String,
+        /// Name of the part; its number by default.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
         /// Mass, kg.
         #[serde(with = "checked::Positive")]
         mass_kg: f64,
@@ -136,11 +139,13 @@ pub enum LinkageSpec {
     /// Rigid connection: the head is screwed to the base.
     Rigid {
         /// Pose of the head in the base.
+        #[serde(default)]
         base_from_head: PlacementSpec,
     },
     /// A motor rotates the head along a given angle; it has no compliance.
     Actuated {
         /// Pose of the head in the base before the motor starts.
+        #[serde(default)]
         base_from_head: PlacementSpec,
         /// Axis and motion of the motor.
         motor: MotorSpec,
@@ -150,8 +155,10 @@ pub enum LinkageSpec {
         /// The spring: a coil, a stiffness matrix, or the name of a spring spec.
         spring: SpringSpec,
         /// Number of segments that model large deflections, 1 to 64; 1 is fastest.
+        #[serde(default = "crate::usual::segments")]
         segments: usize,
         /// Pose of the spring's foot in the base; z points along the spring.
+        #[serde(default)]
         base_from_spring: PlacementSpec,
         /// Pose of the spring's top in the head.
         head_from_spring: PlacementSpec,
@@ -175,6 +182,7 @@ pub enum LinkageSpec {
         /// The elements between base and head.
         elements: Vec<ElementSpec>,
         /// Approximate pose of the head in the base in equilibrium; start of the search for the equilibrium.
+        #[serde(default)]
         base_from_head: PlacementSpec,
         /// Damping ratios of the modes, in addition to the dampers of the elements.
         damping_ratio: DampingSpec,
@@ -231,7 +239,7 @@ pub struct EndStopSpec {
     #[serde(with = "checked::Positive")]
     pub stiffness_nm_per_rad: f64,
     /// Damping of the tilt rate during contact, N m s/rad.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub damping_nm_s_per_rad: f64,
 }
 

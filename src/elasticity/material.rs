@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use zsim_base::spec::checked;
 
 /// Material of a wire.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Material {
     /// Patented or music wire: E = 206 GPa, G = 79.3 GPa.
+    #[default]
     SpringSteel,
     /// Stainless 302: E = 193 GPa, G = 69 GPa.
     Stainless,

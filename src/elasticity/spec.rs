@@ -34,6 +34,7 @@ pub enum SpringSpec {
         #[serde(default, with = "checked::Finite")]
         start_deg: f64,
         /// Material of the wire.
+        #[serde(default)]
         material: Material,
         /// Coefficient of restitution of the coils: speed of a head after a clash along the spring over that before it, for a contact
         /// force well above that of the open spring; 1: elastic.
