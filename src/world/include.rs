@@ -97,7 +97,11 @@ impl NamedSpec for SceneSpec {
     type Error = WorldError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
+        let scene: Self = parse_named(source)?;
+        if scene.name.is_empty() {
+            return Ok(Self { name: source.stem(), ..scene });
+        }
+        Ok(scene)
     }
 
     fn resolved(self, source: &Source) -> Result<Self, WorldError> {

@@ -41,6 +41,7 @@ mod shape;
 mod spec;
 mod sway;
 mod triangle;
+mod usual;
 
 pub use canopy::CanopyCrossing;
 pub use error::WorldError;

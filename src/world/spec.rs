@@ -9,17 +9,20 @@ use zsim_base::spec::checked;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
-    /// Name of the scene.
+    /// Name of the scene; that of the file by default.
+    #[serde(default)]
     pub name: String,
     /// Other scenes to include, by path or name. All their parts become part of this scene.
     #[serde(default)]
     pub include: Vec<String>,
     /// The materials, by name.
+    #[serde(default)]
     pub materials: BTreeMap<String, MaterialSpec>,
     /// Groups of items that are placed together, each in its own frame, by name.
     #[serde(default)]
     pub templates: BTreeMap<String, Vec<ItemSpec>>,
     /// Static items.
+    #[serde(default)]
     pub items: Vec<ItemSpec>,
     /// Movers: templates that move along waypoints.
     #[serde(default)]
@@ -98,27 +101,30 @@ pub struct ScatterSpec {
     /// Name of the template.
     pub template: String,
     /// Random seed of the poses. It belongs to the scene, so all runs have the same poses.
+    #[serde(default = "crate::usual::seed")]
     pub seed: u64,
     /// Number of copies.
     pub count: usize,
     /// Two opposite corners of the region for the origins of the copies, m.
     pub region_m: ([f64; 3], [f64; 3]),
     /// Minimum distance between the origins of two copies, m.
-    #[serde(with = "checked::NonNegative")]
+    #[serde(default, with = "checked::NonNegative")]
     pub min_spacing_m: f64,
     /// Minimum horizontal distance of an origin from any route, m. Default: 0.
     #[serde(default, with = "checked::NonNegative")]
     pub keep_from_routes_m: f64,
     /// Random rotation of the copies.
+    #[serde(default)]
     pub turn: Turn,
 }
 
 /// Random rotation of scattered copies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 pub enum Turn {
     /// No rotation.
     Fixed,
     /// About z by a random angle.
+    #[default]
     Upright,
     /// Any rotation, uniformly distributed.
     Any,
@@ -134,6 +140,7 @@ pub struct MoverSpec {
     /// angle.
     pub waypoints: Vec<WaypointSpec>,
     /// If true, the waypoints repeat; if false, the mover stays at the last one.
+    #[serde(default = "crate::usual::repeats")]
     pub repeats: bool,
 }
 
@@ -200,6 +207,7 @@ pub struct CanopySpec {
 #[serde(deny_unknown_fields)]
 pub struct RouteSpec {
     /// Whether the last point is connected to the first.
+    #[serde(default)]
     pub closed: bool,
     /// Points on the floor: x, y, z, m.
     pub points_m: Vec<[f64; 3]>,

@@ -16,6 +16,7 @@ pub enum HeightsSpec {
     /// previous one.
     Rolling {
         /// Random seed. It belongs to the scene, so all runs have the same terrain.
+        #[serde(default = "crate::usual::seed")]
         seed: u64,
         /// Number of cells along x and y.
         cells: [usize; 2],
