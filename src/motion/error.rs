@@ -11,8 +11,8 @@ pub enum MotionError {
     Spec(#[from] SpecError),
     /// The motion follows a route, but the scene has none.
     #[error(
-        "the motion {motion} follows a route, but the scene has no default route; add `routes` and `default_route` to the scene, name one of its routes \
-         with --route, or choose a motion without one, such as `stand`"
+        "the motion {motion} follows a route, but the scene has no default route; add `routes` to the scene, with several also `default_route`, or name one with \
+         --route, or choose a motion without one, such as `stand`"
     )]
     NoRoute {
         /// Name of the motion.

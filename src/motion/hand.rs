@@ -26,7 +26,7 @@ use zsim_base::spec::checked::{Finite, Fraction, NonNegative, Positive};
 #[serde(deny_unknown_fields)]
 pub struct HandSpec {
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Height of the base above the floor, m.
     #[serde(with = "Finite")]
@@ -37,10 +37,11 @@ pub struct HandSpec {
     pub gait: Option<GaitSpec>,
     /// Rotation of the wrist.
     pub shake: ShakeSpec,
-    /// When the hand grips the head.
+    /// When the hand grips the head; never by default.
+    #[serde(default)]
     pub stops: StopsSpec,
     /// Time to grasp the head, and to release it, s.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::grip_s", with = "Positive")]
     pub grip_s: f64,
     /// Rests of the walker: start and duration of each, s. The wrist does not shake during a rest; the head swings on
     /// its spring unless a stop holds it.
@@ -69,7 +70,7 @@ pub enum CarrySpec {
         #[serde(with = "Positive")]
         speed_m_per_s: f64,
         /// Half-width of the kernel that smooths the corners, s.
-        #[serde(with = "Positive")]
+        #[serde(default = "crate::usual::smoothing_s", with = "Positive")]
         smoothing_s: f64,
     },
 }
@@ -91,7 +92,7 @@ pub struct GaitSpec {
     #[serde(with = "NonNegative")]
     pub surge_m: f64,
     /// Phase noise of the gait, rad rms of the phase of two steps.
-    #[serde(with = "NonNegative")]
+    #[serde(default, with = "NonNegative")]
     pub irregularity_rad: f64,
 }
 
@@ -110,21 +111,22 @@ pub struct ShakeSpec {
     pub roll_deg: f64,
     /// If true, roll follows pitch by a quarter of a period, so that the head circles; if false, roll oscillates
     /// independently.
+    #[serde(default)]
     pub lasso: bool,
     /// Standard deviation of the amplitudes, as a fraction of their mean.
-    #[serde(with = "Fraction")]
+    #[serde(default, with = "Fraction")]
     pub amplitude_spread: f64,
     /// Standard deviation of the phase, rad.
-    #[serde(with = "NonNegative")]
+    #[serde(default, with = "NonNegative")]
     pub phase_spread_rad: f64,
     /// Bandwidth of the variations of amplitude and phase, Hz.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::wander_hz", with = "Positive")]
     pub wander_hz: f64,
     /// Distance of the wrist, the centre of rotation, below the base, m.
-    #[serde(with = "Finite")]
+    #[serde(default, with = "Finite")]
     pub wrist_below_m: f64,
     /// Time in which the shaking rises to full amplitude, s.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::onset_s", with = "Positive")]
     pub onset_s: f64,
 }
 

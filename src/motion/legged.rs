@@ -17,7 +17,7 @@ use zsim_base::spec::checked::{Finite, FiniteArray, NonNegative, Positive};
 #[serde(deny_unknown_fields)]
 pub struct LeggedSpec {
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Height of the base above the floor, m.
     #[serde(with = "Finite")]
@@ -28,9 +28,10 @@ pub struct LeggedSpec {
     #[serde(with = "Positive")]
     pub stride_hz: f64,
     /// Phase noise of the strides, turns rms, with power up to a tenth of the stride frequency.
-    #[serde(with = "NonNegative")]
+    #[serde(default, with = "NonNegative")]
     pub irregularity_turns: f64,
     /// Harmonics of the body motion in a stride. Their amplitudes apply at full speed and scale with the speed.
+    #[serde(default)]
     pub harmonics: Vec<StrideSpec>,
 }
 
@@ -42,16 +43,16 @@ pub struct StrideSpec {
     #[serde(with = "Positive")]
     pub order: f64,
     /// Amplitudes forward, left and up, m.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub position_m: [f64; 3],
     /// Phases of these amplitudes, degrees.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub position_phase_deg: [f64; 3],
     /// Amplitudes of roll, pitch and yaw, degrees.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub rotation_deg: [f64; 3],
     /// Phases of these amplitudes, degrees.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub rotation_phase_deg: [f64; 3],
 }
 

@@ -26,6 +26,7 @@ mod spec;
 mod stand;
 mod stops;
 mod uav;
+mod usual;
 mod vehicle;
 mod walk;
 
@@ -43,4 +44,4 @@ pub use stand::StandSpec;
 pub use stops::StopsSpec;
 pub use uav::{GustSpec, RotorSpec, UavSpec};
 pub use vehicle::{EngineSpec, OrderSpec, RoadClass, RoadSpec, SuspensionSpec, VehicleSpec};
-pub use walk::WalkSpec;
+pub use walk::{Speed, WalkSpec};

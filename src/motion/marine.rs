@@ -24,13 +24,13 @@ use zsim_base::spec::{Source, SpecError};
 #[serde(deny_unknown_fields)]
 pub struct MarineSpec {
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Time in which the waves rise to their full height, s.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::onset_s", with = "Positive")]
     pub onset_s: f64,
     /// Position of the base relative to the centre of the waterplane: forward, left, up, m.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub base_m: [f64; 3],
     /// The waves.
     pub sea: SeaSpec,
@@ -49,11 +49,11 @@ pub struct SeaSpec {
     #[serde(with = "Positive")]
     pub peak_period_s: f64,
     /// JONSWAP peak enhancement factor: 3.3 in a growing wind sea, 1 in a fully developed sea (Pierson-Moskowitz).
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::peakedness", with = "Positive")]
     pub peakedness: f64,
     /// Mean direction of propagation relative to the bow, degrees to the left: 0 for waves from astern, 180 for head
     /// seas.
-    #[serde(with = "Finite")]
+    #[serde(default, with = "Finite")]
     pub going_deg: f64,
     /// Exponent s of the directional spreading `cos^2s`. A larger value gives longer crests.
     #[serde(with = "NonNegative")]

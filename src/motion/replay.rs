@@ -25,12 +25,13 @@ pub struct ReplaySpec {
     pub poses: PosesSpec,
     /// If true, the trajectory is translated and turned about the vertical so that it starts at the start of the
     /// scene's route; if false, it is replayed as recorded.
+    #[serde(default = "crate::usual::from_route")]
     pub from_route: bool,
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Half of the time in which the replay reaches full speed, and stops, s.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::ease_s", with = "Positive")]
     pub ease_s: f64,
 }
 

@@ -22,10 +22,10 @@ pub struct ShakerSpec {
     #[serde(with = "Finite")]
     pub height_m: f64,
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Time in which the signals rise to their full amplitude, s.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::onset_s", with = "Positive")]
     pub onset_s: f64,
     /// The signals. Signals on the same axis are added.
     pub drives: Vec<DriveSpec>,

@@ -27,6 +27,12 @@ pub enum StopsSpec {
     },
 }
 
+impl Default for StopsSpec {
+    fn default() -> Self {
+        Self::At(Vec::new())
+    }
+}
+
 impl StopsSpec {
     /// Grip over time, 0 to 1: in each stop it rises for `grip_s`, stays at 1, and falls for `grip_s`.
     ///

@@ -18,26 +18,31 @@ pub struct WalkSpec {
     /// Speed on straight legs, m/s.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub speed_m_per_s: f64,
-    /// Speed at a corner of 90 degrees or more, m/s. At a smaller corner the speed is interpolated linearly in the
-    /// angle.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub corner_speed_m_per_s: f64,
+    /// Speed at a corner of 90 degrees or more, m/s; 60 % of the speed on straight legs by default. At a smaller corner the
+    /// speed is interpolated linearly in the angle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corner_speed_m_per_s: Option<Speed>,
     /// Distance before and after a corner over which the speed is reduced, m.
-    #[serde(with = "zsim_base::spec::checked::NonNegative")]
+    #[serde(default = "crate::usual::corner_reach_m", with = "zsim_base::spec::checked::NonNegative")]
     pub corner_reach_m: f64,
     /// Half-width of the smoothing kernel, s. A larger value cuts corners more and accelerates more gently.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
+    #[serde(default = "crate::usual::smoothing_s", with = "zsim_base::spec::checked::Positive")]
     pub smoothing_s: f64,
     /// Minimum half-width of a turn in heading, s.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
+    #[serde(default = "crate::usual::turn_s", with = "zsim_base::spec::checked::Positive")]
     pub turn_s: f64,
     /// Maximum turn rate, degrees/s. A larger turn takes longer.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
+    #[serde(default = "crate::usual::turn_rate_deg_per_s", with = "zsim_base::spec::checked::Positive")]
     pub turn_rate_deg_per_s: f64,
     /// Delay of the turn in heading after the turn of the path, s.
-    #[serde(with = "zsim_base::spec::checked::Finite")]
+    #[serde(default = "crate::usual::turn_lag_s", with = "zsim_base::spec::checked::Finite")]
     pub turn_lag_s: f64,
 }
+
+/// A speed above zero, m/s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(transparent)]
+pub struct Speed(#[serde(with = "zsim_base::spec::checked::Positive")] pub f64);
 
 /// Motion along a route: position, heading and speed.
 #[derive(Debug, Clone)]
@@ -53,20 +58,29 @@ pub(super) struct RouteMotion {
 /// Maximum number of path segments: 10 hours of walking round a small room.
 const MAX_KNOTS: usize = 1 << 18;
 
+/// Speed at a corner over that on straight legs, where a spec has none.
+const USUAL_CORNER_SPEED: f64 = 0.6;
+
 /// Two points of a route closer than this coincide, m: a leg of 1 mm has no useful direction.
 const SAME_POINT_M: f64 = 1e-3;
 
 impl WalkSpec {
     /// Checks the relations between fields.
     pub(super) fn check(&self, source: &Source) -> Result<(), SpecError> {
-        if self.corner_speed_m_per_s > self.speed_m_per_s {
+        if self.right_angle_speed() > self.speed_m_per_s {
             let message = format!(
                 "corners are walked at {} m/s, faster than the straight at {} m/s",
-                self.corner_speed_m_per_s, self.speed_m_per_s
+                self.right_angle_speed(),
+                self.speed_m_per_s
             );
             return Err(SpecError::about(source, "corner_speed_m_per_s", message));
         }
         Ok(())
+    }
+
+    /// Speed at a corner of 90 degrees or more, m/s.
+    fn right_angle_speed(&self) -> f64 {
+        self.corner_speed_m_per_s.map_or(USUAL_CORNER_SPEED * self.speed_m_per_s, |speed| speed.0)
     }
 
     /// The motion along `route` from `from_s` until at least `until_s`.
@@ -90,7 +104,7 @@ impl WalkSpec {
     /// Speed at a corner that turns by `angle` rad, m/s.
     fn corner_speed(&self, angle: f64) -> f64 {
         let fraction = (angle / FRAC_PI_2).min(1.0);
-        self.speed_m_per_s + (self.corner_speed_m_per_s - self.speed_m_per_s) * fraction
+        self.speed_m_per_s + (self.right_angle_speed() - self.speed_m_per_s) * fraction
     }
 
     /// Half-width of a turn by `angle` rad, s.

@@ -19,7 +19,7 @@ pub struct RotorSpec {
     #[serde(with = "Positive")]
     pub speed_hz: f64,
     /// Maximum deviation of a rotor's speed from the mean, as a fraction of it; uniformly distributed.
-    #[serde(with = "zsim_base::spec::checked::Fraction")]
+    #[serde(default, with = "zsim_base::spec::checked::Fraction")]
     pub speed_spread: f64,
     /// Blades per rotor.
     pub blades: u8,

@@ -12,10 +12,10 @@ use zsim_base::spec::checked::Positive;
 #[serde(deny_unknown_fields)]
 pub struct UavSpec {
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Time in which gusts and vibration rise to their full amplitude, s.
-    #[serde(with = "Positive")]
+    #[serde(default = "crate::usual::onset_s", with = "Positive")]
     pub onset_s: f64,
     /// Height of the base above the floor of the route, m.
     #[serde(with = "Positive")]

@@ -18,7 +18,7 @@ pub struct EngineSpec {
     #[serde(with = "Positive")]
     pub speed_rpm: f64,
     /// Phase noise, turns rms, with power up to 0.5 Hz.
-    #[serde(with = "NonNegative")]
+    #[serde(default, with = "NonNegative")]
     pub irregularity_turns: f64,
     /// The harmonics.
     pub orders: Vec<OrderSpec>,

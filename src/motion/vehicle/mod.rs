@@ -31,10 +31,10 @@ use zsim_base::spec::{Source, SpecError};
 #[serde(deny_unknown_fields)]
 pub struct VehicleSpec {
     /// Time at rest at the start, s.
-    #[serde(with = "NonNegative")]
+    #[serde(default = "crate::usual::still_s", with = "NonNegative")]
     pub still_s: f64,
     /// Position of the base relative to the body's centre of mass: forward, left, up, m.
-    #[serde(with = "FiniteArray::<3>")]
+    #[serde(default, with = "FiniteArray::<3>")]
     pub base_m: [f64; 3],
     /// How the vehicle follows the route.
     pub follow: WalkSpec,
