@@ -8,6 +8,7 @@ use zsim_base::spec::checked;
 #[serde(deny_unknown_fields)]
 pub struct FaultsSpec {
     /// The faults, applied in order: each acts on the output of the previous ones.
+    #[serde(default)]
     pub faults: Vec<FaultSpec>,
 }
 
@@ -93,7 +94,7 @@ pub enum FaultKind {
         /// Messages in a group, 2 to 1000.
         size: usize,
         /// Time between the stamps within a group, us; 0 for equal stamps.
-        #[serde(with = "checked::NonNegative")]
+        #[serde(default, with = "checked::NonNegative")]
         spacing_us: f64,
     },
     /// The IMU saturates below the limits of the data sheet. The noise model that is published with the recording
