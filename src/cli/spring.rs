@@ -198,8 +198,9 @@ fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
     let bar = WorkBar::new(global, "searching");
     let study = DesignSearch::new(&spec, &source)?.run(&|fraction| bar.set_fraction(fraction))?;
     drop(bar);
-    let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{stem}")));
+    let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy();
+    let name = spec.name.as_deref().unwrap_or(&stem);
+    let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{name}")));
     let folder = output::folder(&wanted, design.out.force)?;
     replace_text(&folder.join("pareto.csv"), &csv(&study))?;
     replace_text(&folder.join("rejected.csv"), &rejected_csv(&study))?;

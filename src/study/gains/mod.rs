@@ -37,15 +37,33 @@ pub struct GainsSpec {
     /// Axis: of angular rate for a rotation, of acceleration for a translation.
     pub axis: Axis,
     /// Highest frequency, Hz.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::up_to_hz", with = "checked::Positive")]
     pub up_to_hz: f64,
     /// Number of averaged realisations, at least 2.
+    #[serde(default = "usual::realisations")]
     pub realisations: usize,
     /// Period of the multisine, s; by default at least two spectral lines are in the narrowest resonance.
     pub period_s: Option<f64>,
     /// Maximum settling time, s. A transient that lasts longer lowers the coherence.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::longest_settling_s", with = "checked::Positive")]
     pub longest_settling_s: f64,
+}
+
+/// The values of keys that are omitted: those of the default plan.
+mod usual {
+    use super::GainPlan;
+
+    pub fn up_to_hz() -> f64 {
+        GainPlan::default().up_to_hz
+    }
+
+    pub fn realisations() -> usize {
+        GainPlan::default().realisations
+    }
+
+    pub fn longest_settling_s() -> f64 {
+        GainPlan::default().longest_settling_s
+    }
 }
 
 impl GainsSpec {

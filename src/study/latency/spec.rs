@@ -14,18 +14,36 @@ const MAX_TIMING_ERROR_MS: f64 = 20.0;
 #[serde(deny_unknown_fields)]
 pub struct TimingSpec {
     /// Delay of the IMU's stamps relative to the lidar's for the same time, ms, from -20 to 20.
+    #[serde(default)]
     pub latency_ms: f64,
     /// Standard deviation of the white noise on the stamps of the lidar's scans, ms, from 0 to 20. An estimator that
     /// smooths stamps is given this jitter.
+    #[serde(default)]
     pub noise_ms: f64,
     /// Length of the blocks of the bootstrap for confidence intervals, s; at most half the run's duration.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::block_s", with = "checked::Positive")]
     pub block_s: f64,
     /// Time range of the returns in a map, centred in the run, s.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::shown_s", with = "checked::Positive")]
     pub shown_s: f64,
     /// Whether the run has a map in the figure.
+    #[serde(default = "usual::shown")]
     pub shown: bool,
+}
+
+/// The values of keys that are omitted.
+mod usual {
+    pub fn block_s() -> f64 {
+        5.0
+    }
+
+    pub fn shown_s() -> f64 {
+        20.0
+    }
+
+    pub fn shown() -> bool {
+        true
+    }
 }
 
 impl TimingSpec {

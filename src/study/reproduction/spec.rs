@@ -27,11 +27,13 @@ pub enum ExperimentSpec {
 pub struct RunsSpec {
     /// Number of the figure or the section in the paper, `-` for an experiment that the paper does not have.
     pub figure: String,
-    /// What the experiment shows.
+    /// What the experiment shows, for its heading.
+    #[serde(default)]
     pub title: String,
     /// The study: a name under `specs/studies/`, or a file. It has one axis.
     pub study: String,
     /// The smoke test.
+    #[serde(default)]
     pub quick: QuickSpec,
     /// Whether to plot the clock offset of each run over time. The study measures `clock_error_30s_s`.
     #[serde(default)]
@@ -45,6 +47,7 @@ pub struct RunsSpec {
     #[serde(default)]
     pub warns: Vec<WarningSpec>,
     /// Assumptions and discrepancies.
+    #[serde(default)]
     pub notes: Vec<String>,
 }
 
@@ -53,11 +56,21 @@ pub struct RunsSpec {
 #[serde(deny_unknown_fields)]
 pub struct QuickSpec {
     /// Duration of a run, s.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual_duration_s", with = "checked::Positive")]
     pub duration_s: f64,
     /// Number of seeds.
     #[serde(default = "one")]
     pub seeds: NonZeroUsize,
+}
+
+fn usual_duration_s() -> f64 {
+    20.0
+}
+
+impl Default for QuickSpec {
+    fn default() -> Self {
+        Self { duration_s: usual_duration_s(), seeds: one() }
+    }
 }
 
 fn one() -> NonZeroUsize {
@@ -235,11 +248,12 @@ impl RunsSpec {
     /// Heading: the figure or the section of the paper, and what the experiment shows.
     pub(super) fn heading(&self) -> String {
         let Self { figure, title, .. } = self;
-        match figure.chars().next() {
-            Some(first) if first.is_ascii_digit() => format!("Figure {figure}: {title}"),
-            Some(first) if first.is_alphabetic() => format!("Section {figure}: {title}"),
-            _ => title.clone(),
-        }
+        let place = match figure.chars().next() {
+            Some(first) if first.is_ascii_digit() => format!("Figure {figure}"),
+            Some(first) if first.is_alphabetic() => format!("Section {figure}"),
+            _ => String::new(),
+        };
+        [place.as_str(), title].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(": ")
     }
 
     /// The study of an extent, and its source.

@@ -6,13 +6,12 @@ use zsim_dynamics::HeadModel;
 
 /// A sinusoidal pitch motion of the base about the foot of the spring, as by a hand.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Shake {
     /// Amplitude of the base's pitch, degrees.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub pitch_deg: f64,
     /// Frequency, Hz; default: that of the slowest mode of the head.
-    #[serde(default)]
     pub frequency_hz: Option<f64>,
 }
 

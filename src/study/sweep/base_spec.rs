@@ -15,13 +15,16 @@ pub enum BaseSpec {
     /// A head on its spring, shaken by a hand, in closed form without simulation; takes below 1 ms.
     Spring {
         /// Head with its spring.
+        #[serde(default = "usual::head")]
         head: String,
         /// Shake of the hand.
+        #[serde(default)]
         shake: Shake,
     },
     /// The gains of a head, by a simulation on a base that is shaken along or about one axis.
     Gains {
         /// Head with its linkage.
+        #[serde(default = "usual::head")]
         head: String,
         /// Axis and settings of the measurement.
         gains: GainsSpec,
@@ -122,14 +125,16 @@ pub struct ReferenceSpec {
     /// Head and its mount.
     pub head: String,
     /// Motion of the base.
+    #[serde(default = "usual::motion")]
     pub motion: String,
     /// Lidar.
+    #[serde(default = "usual::lidar")]
     pub lidar: String,
 }
 
 /// Limits of computing time and memory; a run that exceeds them counts as failed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct LimitSpec {
     /// Time limit of a simulation, and of each estimate from it, s.
     #[serde(with = "checked::Positive")]
@@ -144,9 +149,24 @@ impl Default for LimitSpec {
     }
 }
 
-/// The values of a journey's keys that are omitted: those of a simulation on the command line.
-mod usual {
+/// The values of keys that are omitted: those of a simulation on the command line.
+pub(crate) mod usual {
     use zsim_simulation::Scenario;
+
+    /// Random seed.
+    pub const SEED: u64 = 1;
+
+    pub fn seed() -> u64 {
+        SEED
+    }
+
+    pub fn seeds() -> Vec<u64> {
+        vec![SEED]
+    }
+
+    pub fn time_limit_s() -> f64 {
+        super::LimitSpec::default().time_s
+    }
 
     fn scenario() -> Scenario {
         Scenario::in_scene("")

@@ -53,6 +53,7 @@ mod tree;
 mod trend;
 mod worker;
 
+pub(crate) use base_spec::usual;
 pub use base_spec::{BaseSpec, LimitSpec, ReferenceSpec};
 pub use bootstrap::{Block, ConfidenceInterval};
 pub(super) use bootstrap::{Resampling, pooled};
@@ -64,6 +65,7 @@ pub use measure::Measure;
 pub use merge::SweepStatus;
 pub use pareto::{pareto_set, spread};
 pub use plan::Plan;
+pub(crate) use plan::check_folder_name;
 pub use repeat::RepeatedRun;
 pub use report::MergedReport;
 pub(super) use results::Results;

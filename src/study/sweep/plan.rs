@@ -75,11 +75,7 @@ impl Plan {
     ) -> Result<Self, StudyError> {
         check(spec, source)?;
         let name = spec.name.as_deref().unwrap_or(name);
-        if let Some(own) = spec.name.as_deref().filter(|own| !is_folder_name(own)) {
-            let message =
-                format!("name {own:?} must be the name of a folder: letters, digits, spaces, -, _ and dots inside");
-            return Err(SpecError::about(source, "name", message).into());
-        }
+        check_folder_name(spec.name.as_deref(), source)?;
         if name.chars().any(char::is_control) {
             let message = format!("the sweep's name {name:?} has control characters: rename its file");
             return Err(SpecError::plain(&source.name, message).into());
@@ -214,6 +210,21 @@ impl Plan {
         let mut all: Vec<&[u8]> = vec![env!("CARGO_PKG_VERSION").as_bytes(), &seed, kind];
         parts.for_each(|part| all.push(part));
         ContentHash::of(all)
+    }
+}
+
+/// Checks the name that a study gives to its folder.
+///
+/// # Errors
+/// If it is not the name of a folder.
+pub(crate) fn check_folder_name(name: Option<&str>, source: &Source) -> Result<(), SpecError> {
+    match name.filter(|name| !is_folder_name(name)) {
+        None => Ok(()),
+        Some(name) => {
+            let message =
+                format!("name {name:?} must be the name of a folder: letters, digits, spaces, -, _ and dots inside");
+            Err(SpecError::about(source, "name", message))
+        }
     }
 }
 

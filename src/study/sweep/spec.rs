@@ -1,5 +1,6 @@
 //! Spec of a sweep: `specs/studies/NAME.ron`.
 
+use super::base_spec::usual;
 use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,11 +18,15 @@ pub struct SweepSpec {
     /// Axes: the parameters to vary. In a grid the other levels of an axis are compared with its first level.
     pub axes: Vec<AxisSpec>,
     /// Selection of the combinations of axis values to run.
+    #[serde(default)]
     pub sampling: Sampling,
-    /// Random seeds; each combination is run with each seed. Must be empty for closed forms, which are deterministic.
+    /// Random seeds; each combination is run with each seed. By default 1 for journeys. Must be empty for closed forms, which
+    /// are deterministic.
     #[serde(default)]
     pub seeds: Vec<u64>,
-    /// Measures to report for each run, the most important first.
+    /// Measures to report for each run, the most important first. By default `position_rmse_m` for journeys and `peak_gain` for
+    /// gains.
+    #[serde(default)]
     pub measures: Vec<Measure>,
     /// Name of an axis: the summary is repeated separately for each of its levels.
     #[serde(default)]
@@ -125,16 +130,18 @@ pub enum Setting {
 }
 
 /// Selection of the combinations of axis values to run.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
 pub enum Sampling {
     /// Full factorial: all combinations; the last axis varies fastest.
+    #[default]
     Grid,
     /// Latin hypercube: one sample in each of `count` equal bins of each axis (McKay, Beckman and Conover 1979).
     LatinHypercube {
         /// Number of samples.
         count: usize,
         /// Random seed of the samples.
+        #[serde(default = "usual::seed")]
         seed: u64,
     },
     /// First points of the Sobol sequence (directions of Joe and Kuo 2008); powers of two fill the space most evenly.
@@ -142,6 +149,24 @@ pub enum Sampling {
         /// Number of samples.
         count: usize,
     },
+}
+
+impl SweepSpec {
+    /// The sweep with the seeds and measures that its base run has by default, where the spec has none.
+    fn with_usual_values(mut self) -> Self {
+        let (seeds, measures): (&[u64], &[Measure]) = match self.base {
+            BaseSpec::Journey { .. } => (&[usual::SEED], &[Measure::POSITION_RMSE_M]),
+            BaseSpec::Gains { .. } => (&[], &[Measure::PEAK_GAIN]),
+            BaseSpec::Spring { .. } => (&[], &[]),
+        };
+        if self.seeds.is_empty() {
+            self.seeds = seeds.to_vec();
+        }
+        if self.measures.is_empty() {
+            self.measures = measures.to_vec();
+        }
+        self
+    }
 }
 
 impl AxisSpec {
@@ -213,6 +238,6 @@ impl NamedSpec for SweepSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
+        parse_named(source).map(Self::with_usual_values)
     }
 }

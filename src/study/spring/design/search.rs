@@ -10,7 +10,7 @@ use super::verified::{Outcomes, Rejection, VerifiedDesign};
 use crate::coverage::CoveragePlan;
 use crate::progress::PieceProgress;
 use crate::spring::{Wire, simulated};
-use crate::sweep::{Measure, pareto_set, spread};
+use crate::sweep::{Measure, check_folder_name, pareto_set, spread};
 use crate::{OnProgress, StudyError};
 use rand::RngExt;
 use rayon::prelude::*;
@@ -113,6 +113,7 @@ impl DesignSearch {
     /// # Errors
     /// When a named spec does not exist, bounds are reversed, no wire is available, or there are no goals or evaluations.
     pub fn new(spec: &DesignSpec, source: &Source) -> Result<Self, StudyError> {
+        check_folder_name(spec.name.as_deref(), source)?;
         let head_source = find_from(Kind::Head, source, &spec.head)?;
         let head = HeadSpec::read(&head_source)?;
         if !matches!(head.linkage, LinkageSpec::Spring { .. }) {

@@ -2,7 +2,7 @@
 
 use super::super::Shake;
 use super::limits::BuildLimitsSpec;
-use crate::sweep::{GoalSpec, MeasureLimitSpec};
+use crate::sweep::{GoalSpec, MeasureLimitSpec, usual};
 use serde::{Deserialize, Serialize};
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
 use zsim_elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
@@ -11,11 +11,17 @@ use zsim_elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DesignSpec {
+    /// Name of the default folder for results; that of the file by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// The head: a name or a file. The search replaces its spring; mounting, damping and stops remain.
+    #[serde(default = "usual::head")]
     pub head: String,
     /// The lidar on the head: a name or a file.
+    #[serde(default = "usual::lidar")]
     pub lidar: String,
     /// Motion of the base for field of view, rate and stress.
+    #[serde(default)]
     pub shake: Shake,
     /// A journey that measures without a closed form are taken from, such as coverage in a second or the accuracy of the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -31,11 +37,29 @@ pub struct DesignSpec {
     #[serde(default)]
     pub build: BuildLimitsSpec,
     /// Number of designs to evaluate; a catalogue is always evaluated completely.
+    #[serde(default = "evaluations")]
     pub evaluations: usize,
     /// Number of designs of the Pareto set that are verified by simulation and reported.
+    #[serde(default = "candidates")]
     pub candidates: usize,
     /// Random seed.
+    #[serde(default = "usual::seed")]
     pub seed: u64,
+}
+
+/// Number of designs to evaluate where a spec has none.
+fn evaluations() -> usize {
+    10_000
+}
+
+/// Number of designs to verify where a spec has none.
+fn candidates() -> usize {
+    12
+}
+
+/// Number of designs with journeys where a spec has none.
+fn journey_designs() -> usize {
+    60
 }
 
 /// A journey with the head and the lidar of a spring search. Each spec is a path or a name in the library.
@@ -48,25 +72,31 @@ pub struct JourneySpec {
     /// Scene.
     pub scene: String,
     /// Motion of the base.
+    #[serde(default = "usual::motion")]
     pub motion: String,
     /// Inertial measurement unit.
+    #[serde(default = "usual::imu")]
     pub imu: String,
     /// Clocks of the sensors.
+    #[serde(default = "usual::clock")]
     pub clock: String,
     /// Settings of the estimator.
+    #[serde(default = "usual::estimator")]
     pub estimator: String,
     /// Route in the scene; the scene's default route if omitted.
     #[serde(default)]
     pub route: Option<String>,
     /// Duration, s.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::duration_s", with = "checked::Positive")]
     pub duration_s: f64,
     /// Random seeds; each is a journey.
+    #[serde(default = "usual::seeds")]
     pub seeds: Vec<u64>,
     /// Number of designs whose journeys are simulated: evenly distributed feasible designs.
+    #[serde(default = "journey_designs")]
     pub designs: usize,
     /// Time limit of a simulation and of an estimate, s.
-    #[serde(with = "checked::Positive")]
+    #[serde(default = "usual::time_limit_s", with = "checked::Positive")]
     pub time_limit_s: f64,
 }
 
@@ -92,6 +122,7 @@ pub enum SpaceSpec {
         #[serde(default)]
         ends: EndsSpec,
         /// Material of the wire.
+        #[serde(default)]
         material: Material,
     },
     /// The springs of a catalogue: a CSV file, or `"stock"` for the built-in one.

@@ -26,6 +26,8 @@ impl Measure {
     pub const COIL_CONTACT_S: Self = Self::named("coil_contact_s");
     /// Error of the clock offset 30 s after the first estimate.
     pub(crate) const CLOCK_ERROR_30S_S: Self = Self::named("clock_error_30s_s");
+    /// Position error of the open loop.
+    pub(crate) const POSITION_RMSE_M: Self = Self::named("position_rmse_m");
     /// Peak gain.
     pub(crate) const PEAK_GAIN: Self = Self::named("peak_gain");
     /// Maximum stress over the yield strength.
@@ -135,7 +137,7 @@ impl Measure {
 
 /// The measures of an estimate that a run with timing errors has, too.
 const WITH_TIMING: [Measure; 4] = [
-    Measure::named("position_rmse_m"),
+    Measure::POSITION_RMSE_M,
     Measure::named("cloud_sigma_m"),
     Measure::named("cloud_bias_m"),
     Measure::named("clock_error_s"),
