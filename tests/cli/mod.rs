@@ -10,6 +10,7 @@ mod gains;
 mod hostile;
 mod hosts;
 mod info;
+mod least;
 mod live;
 mod live_run;
 mod maps;
