@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, NamedSpec, find};
 use zsim_study::latency::text_table;
-use zsim_study::sweep::{Plan, Shard, SweepSpec};
+use zsim_study::sweep::{BaseSpec, Plan, Shard, SweepSpec};
 
 /// The study with the latencies and noises.
 const STUDY: &str = "timing";
@@ -43,7 +43,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let scenario = arguments.scenario.scenario(&arguments.scene);
     let Seed(seed) = scenario.seed;
     spec.seeds = vec![seed];
-    spec.base.set_scenario(scenario, &arguments.estimator);
+    if let BaseSpec::Journey(journey) = spec.base {
+        spec.base = BaseSpec::Journey(journey.in_scenario(scenario, &arguments.estimator));
+    }
     let plan = Plan::new(STUDY, &spec, &source)?;
     let folder = output::folder_to_resume(&arguments.out)?;
     let planned = plan.write(&folder, arguments.force)?;

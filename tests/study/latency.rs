@@ -6,7 +6,7 @@ use zsim::spec::{Kind, Source, find, parse};
 use zsim::study::StudyError;
 use zsim::study::latency::{ClockState, Disturbance, LatencyResult, csv, curve_figure, map_figure, text_table};
 use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::sweep::{AxisSpec, BaseSpec, Plan, Runner, Shard, SweepSpec};
+use zsim::study::sweep::{AxisSpec, BaseSpec, JourneySpec, Plan, Runner, Shard, SweepSpec};
 
 const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
 
@@ -14,7 +14,7 @@ const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
 fn small() -> Plan {
     let source = find(Kind::Study, "timing").unwrap();
     let mut small: SweepSpec = parse(&source).unwrap();
-    let BaseSpec::Journey { scene, duration_s, timing: Some(timing), .. } = &mut small.base else {
+    let BaseSpec::Journey(JourneySpec { scene, duration_s, timing: Some(timing), .. }) = &mut small.base else {
         panic!("the study has timing errors")
     };
     (*scene, *duration_s, timing.block_s) = ("mocap_room".to_owned(), 14.0, 2.0);

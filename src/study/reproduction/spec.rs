@@ -2,7 +2,7 @@
 
 use super::Extent;
 use crate::gains::AXES;
-use crate::sweep::{AxisSpec, BaseSpec, Measure, Setting, SweepSpec};
+use crate::sweep::{AxisSpec, BaseSpec, JourneySpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find_from, parse_named};
@@ -238,7 +238,7 @@ impl TimingMapsSpec {
         let of_study = find_from(Kind::Study, source, name)?;
         let spec: SweepSpec = SweepSpec::parse(&of_study)?;
         match spec.base {
-            BaseSpec::Journey { timing: Some(_), .. } => Ok((spec, of_study)),
+            BaseSpec::Journey(JourneySpec { timing: Some(_), .. }) => Ok((spec, of_study)),
             _ => Err(SpecError::about(source, key, format!("the study \"{name}\" has no `timing`"))),
         }
     }
@@ -293,7 +293,7 @@ impl QuickSpec {
     /// Keeps the first seeds of a study, and shortens its runs.
     fn shorten(&self, spec: &mut SweepSpec) {
         spec.seeds.truncate(self.seeds.get());
-        if let BaseSpec::Journey { duration_s, .. } = &mut spec.base {
+        if let BaseSpec::Journey(JourneySpec { duration_s, .. }) = &mut spec.base {
             *duration_s = self.duration_s;
         }
         for axis in &mut spec.axes {

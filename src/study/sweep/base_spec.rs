@@ -1,11 +1,15 @@
 //! The run that a sweep varies.
 
+use super::reference_inputs::ReferenceInputs;
+use super::tree::Journey;
+use crate::StudyError;
 use crate::gains::GainsSpec;
 use crate::latency::TimingSpec;
 use crate::spring::Shake;
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::checked;
-use zsim_simulation::Scenario;
+use zsim_base::random::Seed;
+use zsim_base::spec::{Named, Source, checked, name_from};
+use zsim_simulation::{Run, Scenario};
 
 /// The base run. Each spec is a path or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -30,55 +34,60 @@ pub enum BaseSpec {
         gains: GainsSpec,
     },
     /// A journey: simulation, recording, open-loop estimation, evaluation.
-    Journey {
-        /// Scene.
-        scene: String,
-        /// Head and its mount.
-        #[serde(default = "usual::head")]
-        head: String,
-        /// Motion of the base.
-        #[serde(default = "usual::motion")]
-        motion: String,
-        /// Lidar.
-        #[serde(default = "usual::lidar")]
-        lidar: String,
-        /// Inertial measurement unit.
-        #[serde(default = "usual::imu")]
-        imu: String,
-        /// Clocks of the sensors.
-        #[serde(default = "usual::clock")]
-        clock: String,
-        /// Faults of the sensors and of data delivery; none by default. An axis over faults requires this key; `"none"`
-        /// is a list without faults.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faults: Option<String>,
-        /// A second IMU on the base; none by default.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        base_imu: Option<String>,
-        /// Settings of the estimator.
-        #[serde(default = "usual::estimator")]
-        estimator: String,
-        /// Timing errors that replace the true offset of the clocks, and the evaluation of the map with them; none by
-        /// default. An axis over timing requires this key.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        timing: Option<TimingSpec>,
-        /// A second system in the same scene; the map of each run is compared with its map. None by default.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        reference: Option<ReferenceSpec>,
-        /// Whether the estimator ignores the sensor models in the recording's manifest, as for a recording of unknown
-        /// sensors.
-        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-        ignore_manifest: bool,
-        /// Route in the scene; the scene's default route if omitted.
-        #[serde(default)]
-        route: Option<String>,
-        /// Duration of a run, s.
-        #[serde(default = "usual::duration_s", with = "checked::Positive")]
-        duration_s: f64,
-        /// Limits of computing time and memory; 600 s and 4 GiB by default.
-        #[serde(default)]
-        limit: LimitSpec,
-    },
+    Journey(JourneySpec),
+}
+
+/// A journey: simulation, recording, open-loop estimation, evaluation. Each spec is a path or a name in the library.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JourneySpec {
+    /// Scene.
+    pub scene: String,
+    /// Head and its mount.
+    #[serde(default = "usual::head")]
+    pub head: String,
+    /// Motion of the base.
+    #[serde(default = "usual::motion")]
+    pub motion: String,
+    /// Lidar.
+    #[serde(default = "usual::lidar")]
+    pub lidar: String,
+    /// Inertial measurement unit.
+    #[serde(default = "usual::imu")]
+    pub imu: String,
+    /// Clocks of the sensors.
+    #[serde(default = "usual::clock")]
+    pub clock: String,
+    /// Faults of the sensors and of data delivery; none by default. An axis over faults requires this key; `"none"`
+    /// is a list without faults.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub faults: Option<String>,
+    /// A second IMU on the base; none by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_imu: Option<String>,
+    /// Settings of the estimator.
+    #[serde(default = "usual::estimator")]
+    pub estimator: String,
+    /// Timing errors that replace the true offset of the clocks, and the evaluation of the map with them; none by
+    /// default. An axis over timing requires this key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<TimingSpec>,
+    /// A second system in the same scene; the map of each run is compared with its map. None by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceSpec>,
+    /// Whether the estimator ignores the sensor models in the recording's manifest, as for a recording of unknown
+    /// sensors.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ignore_manifest: bool,
+    /// Route in the scene; the scene's default route if omitted.
+    #[serde(default)]
+    pub route: Option<String>,
+    /// Duration of a run, s.
+    #[serde(default = "usual::duration_s", with = "checked::Positive")]
+    pub duration_s: f64,
+    /// Limits of computing time and memory; 600 s and 4 GiB by default.
+    #[serde(default)]
+    pub limit: LimitSpec,
 }
 
 impl BaseSpec {
@@ -86,33 +95,45 @@ impl BaseSpec {
     pub(super) fn runs_per_part(&self) -> u64 {
         if matches!(self, Self::Spring { .. }) { 250 } else { 1 }
     }
+}
 
-    /// Replaces the scenario and the estimator of a journey; other runs have none.
-    pub fn set_scenario(&mut self, new: Scenario, new_estimator: &str) {
-        let Self::Journey {
-            scene,
-            head,
-            motion,
-            lidar,
-            imu,
-            clock,
-            faults,
-            base_imu,
-            estimator,
-            route,
-            duration_s,
-            timing: _,
-            reference: _,
-            ignore_manifest: _,
-            limit: _,
-        } = self
-        else {
-            return;
+impl JourneySpec {
+    /// The journey with another scenario and estimator.
+    #[must_use]
+    pub fn in_scenario(self, new: Scenario, estimator: &str) -> Self {
+        let Scenario { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, seed: _ } = new;
+        let estimator = estimator.to_owned();
+        Self { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, estimator, ..self }
+    }
+
+    /// Loads the specs, whose names are relative to `source`; the seed is 0.
+    ///
+    /// # Errors
+    /// If a spec is missing or invalid.
+    pub(super) fn load(&self, source: &Source) -> Result<Journey, StudyError> {
+        let named = |name: &String| name_from(source, name);
+        let scenario = Scenario {
+            scene: named(&self.scene),
+            head: named(&self.head),
+            motion: named(&self.motion),
+            lidar: named(&self.lidar),
+            imu: named(&self.imu),
+            clock: named(&self.clock),
+            base_imu: self.base_imu.as_ref().map(named),
+            faults: self.faults.as_ref().map(named),
+            route: self.route.clone(),
+            duration_s: self.duration_s,
+            seed: Seed(0),
         };
-        (*scene, *head, *motion, *lidar) = (new.scene, new.head, new.motion, new.lidar);
-        (*imu, *clock, *faults, *base_imu) = (new.imu, new.clock, new.faults, new.base_imu);
-        (*route, *duration_s) = (new.route, new.duration_s);
-        new_estimator.clone_into(estimator);
+        let simulation = Run::load(&scenario)?;
+        let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
+        Ok(Journey {
+            simulation,
+            estimator: Named::load(&named(&self.estimator))?,
+            timing: self.timing,
+            reference: self.reference.as_ref().map(of_reference).transpose()?,
+            ignore_manifest: self.ignore_manifest,
+        })
     }
 }
 

@@ -16,7 +16,7 @@ const MAX_COORDINATES: usize = 100_000_000;
 /// Checks the fields of a spec against each other.
 pub(super) fn check(spec: &SweepSpec, source: &Source) -> Result<(), SpecError> {
     let about = |key: &str, message: String| SpecError::about(source, key, message);
-    let is_journey = matches!(spec.base, BaseSpec::Journey { .. });
+    let is_journey = matches!(spec.base, BaseSpec::Journey(_));
     if spec.axes.is_empty() {
         return Err(about("axes", "a sweep needs at least one axis".to_owned()));
     }

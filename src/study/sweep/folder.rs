@@ -155,7 +155,7 @@ impl Plan {
     fn hashes_of(&self, index: u64) -> Result<(ContentHash, Option<ContentHash>), StudyError> {
         let inputs = self.inputs(index)?;
         let rays = match self.spec().base {
-            BaseSpec::Journey { .. } => Some(self.journey(index, &inputs)?.rays),
+            BaseSpec::Journey(_) => Some(self.journey(index, &inputs)?.rays),
             BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => None,
         };
         Ok((self.identity(index, &inputs)?, rays))

@@ -54,7 +54,7 @@ mod trend;
 mod worker;
 
 pub(crate) use base_spec::usual;
-pub use base_spec::{BaseSpec, LimitSpec, ReferenceSpec};
+pub use base_spec::{BaseSpec, JourneySpec, LimitSpec, ReferenceSpec};
 pub use bootstrap::{Block, ConfidenceInterval};
 pub(super) use bootstrap::{Resampling, pooled};
 pub(super) use clock_curve::ClockCurve;

@@ -5,7 +5,7 @@ use super::check::{MAX_RUNS, check};
 use super::design::{AxisSize, Design};
 use super::identity::{ContentHash, InputHashes, input_hashes, is_after_recording};
 use super::tree::{GainRun, Journey, Tree};
-use super::{BaseSpec, LimitSpec, Measure, Setting, SweepSpec};
+use super::{BaseSpec, JourneySpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::StudyError;
 use crate::gains::GainsSpec;
 use zsim_base::spec::{Named, Source, SpecError, to_json};
@@ -42,7 +42,7 @@ impl Plan {
     pub fn new(name: &str, spec: &SweepSpec, source: &Source) -> Result<Self, StudyError> {
         let mut specs = SpecSet { base: Tree::load(&spec.base, source)?, ..SpecSet::default() };
         let plan = Self::with_specs(name, spec, &mut specs, source)?;
-        if let BaseSpec::Journey { .. } = spec.base {
+        if let BaseSpec::Journey(_) = spec.base {
             let journey = specs.base.journey(plan.spec.seeds[0]);
             Simulation::build(journey.map_err(|message| StudyError::Plan { what: "base", message })?.simulation)?;
         }
@@ -137,7 +137,7 @@ impl Plan {
     pub(super) fn limit(&self) -> Option<LimitSpec> {
         match self.spec.base {
             BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => None,
-            BaseSpec::Journey { limit, .. } => Some(limit),
+            BaseSpec::Journey(JourneySpec { limit, .. }) => Some(limit),
         }
     }
 

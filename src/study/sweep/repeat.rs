@@ -1,7 +1,7 @@
 //! Single runs of a sweep with all their files.
 
 use super::in_process::evaluate;
-use super::{BaseSpec, Measure, Shard, Sweep};
+use super::{BaseSpec, JourneySpec, Measure, Shard, Sweep};
 use crate::atomic_file::replace_text;
 use crate::result_files::METRICS;
 use crate::{EstimateOptions, EstimateResult, ProgressMonitor, StudyError, simulate_and_estimate};
@@ -52,7 +52,7 @@ impl Sweep {
     /// Whether a run can be repeated on its own: timing errors are applied between recording and estimate, which a full
     /// run does not do.
     pub(super) fn can_repeat(&self) -> bool {
-        !matches!(self.plan.spec().base, BaseSpec::Journey { timing: Some(_), .. })
+        !matches!(self.plan.spec().base, BaseSpec::Journey(JourneySpec { timing: Some(_), .. }))
     }
 
     /// The finished journeys of `shard` that have no complete folder, ascending.
@@ -60,7 +60,7 @@ impl Sweep {
     /// # Errors
     /// If a part cannot be opened, or if the sweep has no full runs.
     pub fn runs_to_keep(&self, shard: Shard) -> Result<Vec<u64>, StudyError> {
-        if !matches!(self.plan.spec().base, BaseSpec::Journey { timing: None, .. }) {
+        if !matches!(self.plan.spec().base, BaseSpec::Journey(JourneySpec { timing: None, .. })) {
             let message = "only full runs without timing errors have a folder of their own".to_owned();
             return Err(StudyError::Plan { what: "--keep-runs", message });
         }
@@ -102,7 +102,7 @@ impl Sweep {
         let refused = |message: String| StudyError::Plan { what: "run", message };
         self.check_repeat(number)?;
         let inputs = self.plan.inputs(number)?;
-        if let BaseSpec::Journey { .. } = self.plan.spec().base {
+        if let BaseSpec::Journey(_) = self.plan.spec().base {
             let journey = self.plan.journey(number, &inputs)?.inputs;
             let simulation = Simulation::build(journey.simulation)?;
             let ignore_manifest = journey.ignore_manifest;

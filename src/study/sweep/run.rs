@@ -53,7 +53,7 @@ impl Sweep {
         }
         match self.plan.spec().base {
             BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => self.run_in_process(&tasks, runner),
-            BaseSpec::Journey { .. } => self.run_in_workers(&tasks, runner),
+            BaseSpec::Journey(_) => self.run_in_workers(&tasks, runner),
         }
     }
 

@@ -155,7 +155,7 @@ impl SweepSpec {
     /// The sweep with the seeds and measures that its base run has by default, where the spec has none.
     fn with_usual_values(mut self) -> Self {
         let (seeds, measures): (&[u64], &[Measure]) = match self.base {
-            BaseSpec::Journey { .. } => (&[usual::SEED], &[Measure::POSITION_RMSE_M]),
+            BaseSpec::Journey(_) => (&[usual::SEED], &[Measure::POSITION_RMSE_M]),
             BaseSpec::Gains { .. } => (&[], &[Measure::PEAK_GAIN]),
             BaseSpec::Spring { .. } => (&[], &[]),
         };

@@ -28,7 +28,7 @@ impl Plan {
     /// # Errors
     /// If the runs are not journeys, or if a combination of settings is invalid.
     pub fn suite(&self) -> Result<Vec<SuiteRecording>, StudyError> {
-        if !matches!(self.spec().base, BaseSpec::Journey { .. }) {
+        if !matches!(self.spec().base, BaseSpec::Journey(_)) {
             let message = "a suite of recordings needs a study of journeys".to_owned();
             return Err(StudyError::Plan { what: "benchmark", message });
         }

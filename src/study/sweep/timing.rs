@@ -1,7 +1,7 @@
 //! Runs with timing errors: their measures, and the latency study that they make up.
 
 use super::bootstrap::pooled;
-use super::{BaseSpec, Journey, Sweep};
+use super::{BaseSpec, Journey, JourneySpec, Sweep};
 use crate::StudyError;
 use crate::atomic_file::write_text;
 use crate::latency::{ClockState, LatencyResult, MapErrors, csv, curve_figure, map_figure};
@@ -26,7 +26,7 @@ impl Sweep {
     /// # Errors
     /// If a part cannot be read.
     pub(super) fn latency_result(&self) -> Result<Option<LatencyResult>, StudyError> {
-        if !matches!(self.plan.spec().base, BaseSpec::Journey { timing: Some(_), .. }) {
+        if !matches!(self.plan.spec().base, BaseSpec::Journey(JourneySpec { timing: Some(_), .. })) {
             return Ok(None);
         }
         let Some(errors) = self.details::<MapErrors>()? else { return Ok(None) };

@@ -1,7 +1,7 @@
 //! The inputs of a run as one tree of settings: an axis of a sweep is a path into it.
 
 use super::reference_inputs::ReferenceInputs;
-use super::{BaseSpec, ReferenceSpec, settings};
+use super::{BaseSpec, settings};
 use crate::StudyError;
 use crate::gains::GainsSpec;
 use crate::latency::TimingSpec;
@@ -9,13 +9,12 @@ use crate::spring::Shake;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use zsim_base::random::Seed;
 use zsim_base::spec::{self, Named, NamedSpec, Source, SpecError, name_from, to_json};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
 use zsim_estimation::EstimatorSpec;
 use zsim_motion::MotionSpec;
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use zsim_simulation::{FaultsSpec, Run, Scenario};
+use zsim_simulation::{FaultsSpec, Run};
 use zsim_world::SceneSpec;
 
 /// Inputs of a journey: the simulation, the estimator, and timing errors between them.
@@ -77,46 +76,7 @@ impl Tree {
                 Self::of(&ClosedForm { shake: *shake, head: Named::load(&named(head))? })
             }
             BaseSpec::Gains { head, gains } => Self::of(&GainRun { gains: *gains, head: Named::load(&named(head))? }),
-            BaseSpec::Journey {
-                scene,
-                head,
-                motion,
-                lidar,
-                imu,
-                clock,
-                faults,
-                base_imu,
-                estimator,
-                timing,
-                reference,
-                ignore_manifest,
-                route,
-                duration_s,
-                limit: _,
-            } => {
-                let scenario = Scenario {
-                    scene: named(scene),
-                    head: named(head),
-                    motion: named(motion),
-                    lidar: named(lidar),
-                    imu: named(imu),
-                    clock: named(clock),
-                    base_imu: base_imu.as_ref().map(named),
-                    faults: faults.as_ref().map(named),
-                    route: route.clone(),
-                    duration_s: *duration_s,
-                    seed: Seed(0),
-                };
-                let simulation = Run::load(&scenario)?;
-                let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
-                Self::of(&Journey {
-                    simulation,
-                    estimator: Named::load(&named(estimator))?,
-                    timing: *timing,
-                    reference: reference.as_ref().map(of_reference).transpose()?,
-                    ignore_manifest: *ignore_manifest,
-                })
-            }
+            BaseSpec::Journey(journey) => Self::of(&journey.load(source)?),
         }
     }
 
@@ -228,7 +188,7 @@ impl Tree {
         match base {
             BaseSpec::Spring { .. } => self.closed_form().map(drop),
             BaseSpec::Gains { .. } => self.gain_run().map(drop),
-            BaseSpec::Journey { .. } => self.journey(0).map(drop),
+            BaseSpec::Journey(_) => self.journey(0).map(drop),
         }
     }
 }
@@ -265,6 +225,7 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use zsim_base::random::Seed;
     use zsim_base::spec::{Kind, names};
 
     fn base() -> Tree {

@@ -231,7 +231,11 @@ impl<'r, 'de> Variant<'r, 'de> {
 
     fn newtype(&self) -> Read<Value<'r, 'de>> {
         let content = self.content()?;
-        content.content(content.node)
+        match content.node.kind {
+            // A struct in a variant needs no second pair of brackets.
+            Kind::Struct(_) if !content.node.is_json() => Ok(content.unwrapped()),
+            _ => content.content(content.node),
+        }
     }
 
     fn fields(&self, known: &'static [&'static str]) -> Read<Entries<'r, 'de>> {

@@ -177,9 +177,14 @@ impl<'r, 'de> Value<'r, 'de> {
     /// The value in the brackets of `Some` or of a variant.
     pub fn content(self, group: &'de Node) -> Read<Self> {
         if self.reader.extensions.unwrap_variant_newtypes && !group.is_json() {
-            return Ok(Self { is_unwrapped: true, ..Self::new(self.reader, group) });
+            return Ok(Self::new(self.reader, group).unwrapped());
         }
         Ok(Self::new(self.reader, self.reader.single(group)?))
+    }
+
+    /// The group as the struct that it contains, without its brackets.
+    pub fn unwrapped(self) -> Self {
+        Self { is_unwrapped: true, ..self }
     }
 
     /// The value in a struct `name` with one field that has no name.

@@ -1,6 +1,6 @@
 //! Journeys of a search: what a spring means for coverage, gyroscope and map.
 
-use super::spec::{DesignSpec, JourneySpec};
+use super::spec::{DesignJourneySpec, DesignSpec};
 use crate::StudyError;
 use crate::sweep::{Journey, LimitSpec, Measure, journey_figures};
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ impl Journeys {
     /// # Errors
     /// If a spec is missing or invalid, or if there are no seeds or designs.
     pub fn load(
-        spec: &JourneySpec,
+        spec: &DesignJourneySpec,
         design: &DesignSpec,
         measures: impl Iterator<Item = Measure>,
         source: &Source,

@@ -26,5 +26,5 @@ pub use evaluation::Candidate;
 pub use limits::{BuildLimitsSpec, Violation, WireStock};
 pub use output::{csv, pareto_figure, rejected_csv};
 pub use search::{DesignSearch, DesignStudy, Exploration};
-pub use spec::{CoilDesign, DesignSpec, JourneySpec, SpaceSpec};
+pub use spec::{CoilDesign, DesignJourneySpec, DesignSpec, SpaceSpec};
 pub use verified::{Rejection, VerifiedDesign};

@@ -25,7 +25,7 @@ pub struct DesignSpec {
     pub shake: Shake,
     /// A journey that measures without a closed form are taken from, such as coverage in a second or the accuracy of the map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub journey: Option<JourneySpec>,
+    pub journey: Option<DesignJourneySpec>,
     /// Design space.
     pub space: SpaceSpec,
     /// Goals; the search returns the Pareto set of them.
@@ -68,7 +68,7 @@ fn journey_designs() -> usize {
 /// rejected.
 #[derive(Debug, Clone, PartialEq, Deserialize, schemars::JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct JourneySpec {
+pub struct DesignJourneySpec {
     /// Scene.
     pub scene: String,
     /// Motion of the base.

@@ -2,8 +2,8 @@
 
 mod table;
 
-use super::BaseSpec;
 use super::results::Results;
+use super::{BaseSpec, JourneySpec};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Deserializer, EnumAccess, Error, VariantAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
@@ -126,11 +126,11 @@ impl Measure {
             (_, Needs::WallClock) => true,
             (BaseSpec::Gains { .. }, _) => self == Self::PEAK_GAIN,
             (BaseSpec::Spring { .. }, _) => self.has_closed_form(),
-            (BaseSpec::Journey { .. }, Needs::Head) => false,
-            (BaseSpec::Journey { .. }, Needs::Swing | Needs::SwingOrHead) => true,
-            (BaseSpec::Journey { reference, .. }, Needs::Reference) => reference.is_some(),
-            (BaseSpec::Journey { timing: None, .. }, needs) => needs != Needs::Timing,
-            (BaseSpec::Journey { timing: Some(_), .. }, _) => WITH_TIMING.contains(&self),
+            (BaseSpec::Journey(_), Needs::Head) => false,
+            (BaseSpec::Journey(_), Needs::Swing | Needs::SwingOrHead) => true,
+            (BaseSpec::Journey(JourneySpec { reference, .. }), Needs::Reference) => reference.is_some(),
+            (BaseSpec::Journey(JourneySpec { timing: None, .. }), needs) => needs != Needs::Timing,
+            (BaseSpec::Journey(JourneySpec { timing: Some(_), .. }), _) => WITH_TIMING.contains(&self),
         }
     }
 }

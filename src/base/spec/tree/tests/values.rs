@@ -140,6 +140,15 @@ fn strings_are_borrowed_from_the_tree() {
 }
 
 #[test]
+fn a_struct_in_a_variant_needs_one_pair_of_brackets() {
+    let wrapped = Shape::Wrapped(Point { x: 1.0, y: Some(2.0) });
+    assert_eq!(read::<Shape>("wrapped(x: 1, y: 2)").unwrap(), wrapped);
+    assert_eq!(read::<Shape>("wrapped((x: 1, y: 2))").unwrap(), wrapped);
+    let error = read::<Shape>("wrapped(x: 1, z: 2)").unwrap_err();
+    assert_eq!(error.line_and_column(), Some((1, 15)), "{error}");
+}
+
+#[test]
 fn extensions_of_the_header_apply() {
     let newtypes = "#![enable(implicit_some, unwrap_newtypes)]\n";
     assert_eq!(read::<Vec<Seed>>(&format!("{newtypes}[1, 2]")).unwrap(), [Seed(1), Seed(2)]);
