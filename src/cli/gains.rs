@@ -163,8 +163,7 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
 
 fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
     let dash = || "-".to_owned();
-    let (header, rows) = peak_table(curves);
-    let mut words = zsim_report::table(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows, true);
+    let mut words = peak_table(curves).body();
     for study in swings {
         let row = |p: &zsim_study::gains::SwingPoint| {
             let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));

@@ -2,7 +2,6 @@
 
 use super::coverage_text;
 use std::collections::{BTreeMap, BTreeSet};
-use zsim_report::page::PageTable;
 use zsim_report::{digits, table, wrapped};
 use zsim_study::spring::design::{DesignStudy, VerifiedDesign};
 use zsim_study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
@@ -14,18 +13,12 @@ pub(super) fn report(report: &SpringReport) -> String {
     let mut words = table(&[], &rows, false);
     words += &report.falls_because.as_ref().map(|why| format!("\n{why}\n")).unwrap_or_default();
     if !report.modes.is_empty() {
-        words += &figures(&mode_table(report, |mode| mode.kind.name()));
+        words += &format!("\n{}", mode_table(report, |mode| mode.kind.name()).body());
     }
     if let Some(stiffness) = &report.stiffness {
-        words += &figures(&stiffness_table("", stiffness));
+        words += &format!("\n{}", stiffness_table("", stiffness).body());
     }
     words + &report.shaken.as_ref().map(under_shake).unwrap_or_default()
-}
-
-/// A table of figures after an empty line.
-fn figures(of: &PageTable) -> String {
-    let header: Vec<&str> = of.header.iter().map(String::as_str).collect();
-    format!("\n{}", table(&header, &of.rows, true))
 }
 
 fn under_shake(shaken: &ShakeResponse) -> String {

@@ -1,6 +1,7 @@
-//! Tables that can be sorted.
+//! Tables with a title, for pages, the terminal and Markdown.
 
 use super::html::escaped;
+use crate::{markdown, table, wrapped};
 
 /// A table of text; rows have as many cells as the header.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -16,6 +17,25 @@ pub struct PageTable {
 }
 
 impl PageTable {
+    /// The table for the terminal, under its title.
+    pub fn text(&self) -> String {
+        format!("{}{}\n", wrapped(&self.title, "  "), self.body())
+    }
+
+    /// The table for the terminal, without its title.
+    pub fn body(&self) -> String {
+        table(&self.names(), &self.rows, true)
+    }
+
+    /// The table as Markdown, under its title.
+    pub fn markdown(&self) -> String {
+        format!("\n{}\n\n{}", self.title, markdown(&self.names(), &self.rows))
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.header.iter().map(String::as_str).collect()
+    }
+
     /// The table under its title.
     pub(super) fn section(&self) -> String {
         format!("<section><h2>{}</h2>\n{}</section>\n", escaped(&self.title), self.html())

@@ -19,8 +19,6 @@ const MAX_LINES: usize = 2_000;
 /// # Errors
 /// When a plot fails, or a value cannot be written as JSON.
 pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingStudy]) -> Result<String, StudyError> {
-    let (header, rows) = peak_table(curves);
-    let peaks = PageTable { title: "Highest peak of each axis".to_owned(), header, rows, ..PageTable::default() };
     let plots = match swings {
         [] => Vec::new(),
         swings => vec![PagePlot { name: "By swing amplitude".to_owned(), svg: swing_figure(swings).svg()? }],
@@ -28,7 +26,7 @@ pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingS
     let page = GainsPage {
         name: name.to_owned(),
         summary: summary(head, curves),
-        tables: vec![peaks, modes(head)],
+        tables: vec![peak_table(curves), modes(head)],
         axes: curves.iter().map(axis_gains).collect(),
         plots,
     };

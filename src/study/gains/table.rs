@@ -3,10 +3,11 @@
 use super::{GainCurve, SwingStudy, axis_name};
 use std::fmt::Write;
 use zsim_dynamics::Peak;
+use zsim_report::page::PageTable;
 use zsim_report::quantity_name;
 
-/// The highest peak of each curve, simulated and in closed form: header and one row per axis.
-pub fn peak_table(curves: &[GainCurve]) -> (Vec<String>, Vec<Vec<String>>) {
+/// The highest peak of each curve, simulated and in closed form: one row per axis.
+pub fn peak_table(curves: &[GainCurve]) -> PageTable {
     let peak = |peak: Option<Peak>| match peak {
         Some(p) => [format!("{:.3}", p.freq_hz), format!("{:.2}", p.gain)],
         None => ["-".to_owned(), "-".to_owned()],
@@ -23,7 +24,12 @@ pub fn peak_table(curves: &[GainCurve]) -> (Vec<String>, Vec<Vec<String>>) {
         ]
     };
     let header = ["axis", "peak Hz", "gain", "closed form Hz", "gain", "min coherence"];
-    (header.map(str::to_owned).to_vec(), curves.iter().map(row).collect())
+    PageTable {
+        title: "Highest peak of each axis".to_owned(),
+        header: header.map(str::to_owned).to_vec(),
+        rows: curves.iter().map(row).collect(),
+        ..PageTable::default()
+    }
 }
 
 /// The minimum coherence of a curve, 0 to 1.

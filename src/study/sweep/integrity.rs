@@ -4,6 +4,7 @@ use super::table::{Column, ColumnType};
 use super::{Measure, Plan, Sweep};
 use crate::StudyError;
 use crate::integrity::large_error_m;
+use zsim_report::page::PageTable;
 
 /// Name of the axis of fault lists, and its level without faults.
 const FAULT_AXIS: (&str, &str) = ("faults", "none");
@@ -101,13 +102,13 @@ fn text_axes(plan: &Plan) -> Vec<String> {
 }
 
 impl IntegrityReport {
-    /// Two tables (title, header, rows): reliability of verdicts and bounds, and the worst runs that are not lost.
-    pub fn tables(&self) -> [(String, Vec<String>, Vec<Vec<String>>); 2] {
+    /// Two tables: reliability of verdicts and bounds, and the worst runs that are not lost.
+    pub fn tables(&self) -> [PageTable; 2] {
         [self.reliability(), self.worst_runs()]
     }
 
     /// Reliability of verdicts and bounds, without and with faults.
-    fn reliability(&self) -> (String, Vec<String>, Vec<Vec<String>>) {
+    fn reliability(&self) -> PageTable {
         let clean: Vec<&RunIntegrity> = self.runs.iter().filter(|run| !run.is_faulted).collect();
         let faulted: Vec<&RunIntegrity> = self.runs.iter().filter(|run| run.is_faulted).collect();
         let row = |name: &str, figure: &dyn Fn(&[&RunIntegrity]) -> String| {
@@ -133,11 +134,12 @@ impl IntegrityReport {
             }),
         ];
         let header = ["", "without faults", "with faults"].map(str::to_owned).to_vec();
-        ("Integrity: verdicts and bounds against true errors".to_owned(), header, rows)
+        let title = "Integrity: verdicts and bounds against true errors".to_owned();
+        PageTable { title, header, rows, ..PageTable::default() }
     }
 
     /// Runs that are not lost, ordered by the fraction within the bound, then by error.
-    fn worst_runs(&self) -> (String, Vec<String>, Vec<Vec<String>>) {
+    fn worst_runs(&self) -> PageTable {
         let mut runs: Vec<&RunIntegrity> = self.runs.iter().filter(|run| run.status < 2.0).collect();
         runs.sort_by(|a, b| {
             let uncovered =
@@ -156,29 +158,12 @@ impl IntegrityReport {
         let mut header = vec!["run".to_owned()];
         header.extend(self.axes.iter().cloned());
         header.extend(["verdict", "error mm", "median bound mm", "within %"].map(str::to_owned));
-        (
-            format!("The {MAX_LISTED_RUNS} worst runs that are not lost"),
+        PageTable {
+            title: format!("The {MAX_LISTED_RUNS} worst runs that are not lost"),
             header,
-            runs.iter().take(MAX_LISTED_RUNS).map(row).collect(),
-        )
-    }
-
-    /// The tables for a terminal.
-    pub fn text(&self) -> String {
-        let text = |(title, header, rows): (String, Vec<String>, Vec<Vec<String>>)| {
-            let header: Vec<&str> = header.iter().map(String::as_str).collect();
-            format!("{title}\n{}\n", zsim_report::table(&header, &rows, true))
-        };
-        self.tables().map(text).concat()
-    }
-
-    /// The tables as Markdown.
-    pub fn markdown(&self) -> String {
-        let text = |(title, header, rows): (String, Vec<String>, Vec<Vec<String>>)| {
-            let header: Vec<&str> = header.iter().map(String::as_str).collect();
-            format!("\n{title}\n\n{}", zsim_report::markdown(&header, &rows))
-        };
-        self.tables().map(text).concat()
+            rows: runs.iter().take(MAX_LISTED_RUNS).map(row).collect(),
+            ..PageTable::default()
+        }
     }
 }
 
@@ -234,7 +219,7 @@ mod tests {
                 run(4, "gap", f64::NAN, f64::NAN, f64::NAN),
             ],
         };
-        let (_, _, rows) = report.reliability();
+        let rows = report.reliability().rows;
         let figures =
             |name: &str| rows.iter().find(|row| row[0].starts_with(name)).map(|row| row[1..].to_vec()).unwrap();
         assert_eq!(figures("runs"), ["2", "3"]);
@@ -242,7 +227,7 @@ mod tests {
         assert_eq!(figures("good, but error"), ["1", "0"]);
         assert_eq!(figures("runs with at least 99 %"), ["50.0", "100.0"]);
         assert_eq!(figures("lost, of runs"), ["0.0", "50.0"]);
-        let (_, _, worst) = report.worst_runs();
+        let worst = report.worst_runs().rows;
         assert_eq!(worst.iter().map(|row| row[0].as_str()).collect::<Vec<_>>(), ["1", "3", "0"]);
     }
 }

@@ -6,6 +6,7 @@ use super::summary::{LevelSummary, SIGNIFICANCE_LEVEL, Summary};
 use super::table::quoted;
 use super::{Measure, Plan};
 use std::fmt::Write;
+use zsim_report::page::PageTable;
 
 /// Axes with more levels are omitted from text and Markdown for readability; `summary.csv` has all levels.
 const MAX_LEVELS_SHOWN: usize = 60;
@@ -48,11 +49,8 @@ fn cell(number: f64) -> String {
 
 /// Tables for the terminal: every axis over all runs.
 pub(super) fn text(summary: &Summary, plan: &Plan) -> String {
-    let tables = tables(summary, plan, false).into_iter().map(|(title, header, rows)| {
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        format!("{}{}\n", zsim_report::wrapped(&title, "  "), zsim_report::table(&header, &rows, true))
-    });
-    tables.collect::<String>() + &zsim_report::wrapped(&legend(summary, "Medians; quartiles are in study.md."), "")
+    tables(summary, plan, false).iter().map(PageTable::text).collect::<String>()
+        + &zsim_report::wrapped(&legend(summary, "Medians; quartiles are in study.md."), "")
 }
 
 /// The tables as Markdown, and again at each level of the axis `by`.
@@ -81,20 +79,14 @@ pub(super) fn markdown(summary: &Summary, plan: &Plan, status: &super::SweepStat
             );
         }
     }
-    for (title, header, rows) in all {
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        text += &format!("\n{title}\n\n{}", zsim_report::markdown(&header, &rows));
-    }
+    text += &all.iter().map(PageTable::markdown).collect::<String>();
     format!("{text}\n{}\n", legend(summary, "Medians (quartiles)."))
 }
 
 /// Measures per table on the terminal, each with its ratio; more are too wide.
 const MEASURES_PER_TABLE: usize = 3;
 
-/// Title, header and rows of a table.
-pub(super) type TextTable = (String, Vec<String>, Vec<Vec<String>>);
-
-pub(super) fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TextTable> {
+pub(super) fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<PageTable> {
     if !summary.trends.is_empty() {
         return vec![trend_table(summary)];
     }
@@ -106,11 +98,11 @@ pub(super) fn tables(summary: &Summary, plan: &Plan, bands: bool) -> Vec<TextTab
     let axis_tables = |axis: &Axis| {
         summary.measures.chunks(across).map(|some| level_table(summary, &axis.name, None, some, bands)).collect()
     };
-    axes.flat_map(|axis: &Axis| -> Vec<TextTable> { axis_tables(axis) }).collect()
+    axes.flat_map(|axis: &Axis| -> Vec<PageTable> { axis_tables(axis) }).collect()
 }
 
 /// Rank correlations, axes by measures.
-fn trend_table(summary: &Summary) -> TextTable {
+fn trend_table(summary: &Summary) -> PageTable {
     let mut header = vec!["axis".to_owned()];
     header.extend(summary.measures.iter().map(|measure| measure.short().to_owned()));
     let cell = |axis: &String, measure: &Measure| {
@@ -124,7 +116,12 @@ fn trend_table(summary: &Summary) -> TextTable {
             .chain(summary.measures.iter().map(|measure| cell(axis, measure)))
             .collect()
     };
-    ("Rank correlation of each measure with each axis".to_owned(), header, summary.axes.iter().map(row).collect())
+    PageTable {
+        title: "Rank correlation of each measure with each axis".to_owned(),
+        header,
+        rows: summary.axes.iter().map(row).collect(),
+        ..PageTable::default()
+    }
 }
 
 /// Levels of an axis by measures: median, with `bands` also quartiles, and the ratio to the first level.
@@ -134,13 +131,13 @@ fn level_table(
     within: Option<(&str, &str)>,
     measures: &[Measure],
     bands: bool,
-) -> TextTable {
+) -> PageTable {
     let mut header = vec![zsim_report::quantity_name(axis)];
     for measure in measures {
         header.extend([heading(*measure), "ratio".to_owned()]);
     }
     let within_level = within.map(|(_, level)| level);
-    let Some(first) = measures.first() else { return (String::new(), header, Vec::new()) };
+    let Some(first) = measures.first() else { return PageTable { header, ..PageTable::default() } };
     let row = |line: &LevelSummary| {
         let mut cells = vec![line.level.clone()];
         for measure in measures {
@@ -156,7 +153,8 @@ fn level_table(
         || "over all runs".to_owned(),
         |(by, level)| format!("{} {level}", zsim_report::quantity_name(by)),
     );
-    (format!("By {}, {place}", zsim_report::quantity_name(axis)), header, rows)
+    let title = format!("By {}, {place}", zsim_report::quantity_name(axis));
+    PageTable { title, header, rows, ..PageTable::default() }
 }
 
 /// Heading of a column: the measure and its unit, if it has one.

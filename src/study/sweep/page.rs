@@ -29,12 +29,7 @@ impl Sweep {
     ) -> Result<StudyPage, StudyError> {
         let of_axes = tables(summary, &self.plan, true).into_iter();
         let of_integrity = integrity.map(IntegrityReport::tables).into_iter().flatten();
-        let tables = of_integrity.chain(of_axes).map(|(title, header, rows)| PageTable {
-            title,
-            header,
-            rows,
-            ..PageTable::default()
-        });
+        let tables = of_integrity.chain(of_axes);
         let runs = Runs::read(self)?;
         let front = self.front(&runs)?.map_or_else(Vec::new, |front| front.optimal);
         let shown = shown_rows(runs.numbers.len(), &front);

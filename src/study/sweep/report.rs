@@ -36,8 +36,9 @@ impl Sweep {
         }
         let summary = self.summary()?;
         let integrity = self.integrity_report()?;
-        let integrity_tables = integrity.as_ref().map_or_else(String::new, IntegrityReport::markdown);
-        let page = markdown(&summary, &self.plan, &status) + &integrity_tables;
+        let integrity_tables = integrity.iter().flat_map(IntegrityReport::tables);
+        let page = markdown(&summary, &self.plan, &status)
+            + &integrity_tables.map(|table| table.markdown()).collect::<String>();
         let mut files = vec![("summary.csv", csv(&summary)), ("study.md", page)];
         if !summary.trends.is_empty() {
             files.push(("trends.csv", trends_csv(&summary)));
@@ -50,7 +51,8 @@ impl Sweep {
         write_text(&self.temporary(), &self.folder.join("report.html"), &page.html())?;
         let latency = self.latency_result()?;
         latency.as_ref().map_or(Ok(()), |study| self.write_latency(study))?;
-        let text = text(&summary, &self.plan) + &integrity.map_or_else(String::new, |integrity| integrity.text());
+        let integrity_tables = integrity.iter().flat_map(IntegrityReport::tables);
+        let text = text(&summary, &self.plan) + &integrity_tables.map(|table| table.text()).collect::<String>();
         Ok(MergedReport { status, summary, text, latency })
     }
 }
