@@ -4,8 +4,8 @@ use crate::background;
 use crate::failure::Failure;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
-use zsim::spec::{Kind, find, parse};
-use zsim::study::sweep::{BaseSpec, Plan, Runner, Shard};
+use zsim::spec::{Kind, NamedSpec, find};
+use zsim::study::sweep::{BaseSpec, Plan, Runner, Shard, SweepSpec};
 
 /// Does the missing runs of the sweep `spec` in the folder `out`, and merges them.
 #[pyfunction]
@@ -20,7 +20,7 @@ pub fn sweep(
     let source = find(Kind::Study, spec)?;
     let name = Path::new(spec).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     background::run(py, progress.as_ref(), move |progress| {
-        let plan = Plan::new(&name, &parse(&source)?, &source)?;
+        let plan = Plan::new(&name, &SweepSpec::parse(&source)?, &source)?;
         if program.is_none() && matches!(plan.spec().base, BaseSpec::Journey { .. }) {
             let message = "full runs need the command zsim in PATH, or its path as program=: each run is a process";
             return Err(Failure::input(message));

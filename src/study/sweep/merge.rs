@@ -113,7 +113,7 @@ impl Sweep {
     /// The error of the first failed run of a merged sweep, if one failed.
     ///
     /// # Errors
-    /// As [`read_merged`](Self::read_merged).
+    /// If the sweep is not merged, or its table cannot be read.
     pub fn first_failure(&self) -> Result<Option<String>, StudyError> {
         let columns = self.read_merged(&self.table(), &[("error", ColumnType::Text)])?;
         Ok(columns.into_iter().flat_map(Column::texts).flatten().find(|error| !error.is_empty()))
