@@ -5,7 +5,6 @@ use super::margins::{LoadRecord, SpringMargins};
 use super::model::SpringModel;
 use crate::StudyError;
 use crate::coverage::{Coverage, CoveragePlan, coverage};
-use crate::sweep::{Measure, Results};
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -39,18 +38,6 @@ pub struct DesignMetrics {
     pub fatigue_margin: Option<f64>,
     /// Margins of the spring.
     pub margins: SpringMargins,
-}
-
-impl DesignMetrics {
-    /// A measure; `None` if it is not known, or has no closed form.
-    pub fn figure(&self, measure: Measure) -> Option<f64> {
-        measure.of(&Results { head: Some(*self), ..Results::default() })
-    }
-
-    /// The figure for goals and limits: infinite if it is not known.
-    pub(super) fn cost_figure(&self, measure: Measure) -> f64 {
-        self.figure(measure).unwrap_or(f64::INFINITY)
-    }
 }
 
 /// Upper frequency of the search for the peak gain, Hz: above the modes of interest.

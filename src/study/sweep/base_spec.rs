@@ -1,15 +1,11 @@
 //! The run that a sweep varies.
 
-use super::reference_inputs::ReferenceInputs;
-use super::tree::Journey;
-use crate::StudyError;
 use crate::gains::GainsSpec;
 use crate::latency::TimingSpec;
 use crate::spring::Shake;
 use serde::{Deserialize, Serialize};
-use zsim_base::random::Seed;
-use zsim_base::spec::{Named, Source, checked, name_from};
-use zsim_simulation::{Run, Scenario};
+use zsim_base::spec::checked;
+use zsim_simulation::Scenario;
 
 /// The base run. Each spec is a path or a name in the library.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -104,36 +100,6 @@ impl JourneySpec {
         let Scenario { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, seed: _ } = new;
         let estimator = estimator.to_owned();
         Self { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, estimator, ..self }
-    }
-
-    /// Loads the specs, whose names are relative to `source`; the seed is 0.
-    ///
-    /// # Errors
-    /// If a spec is missing or invalid.
-    pub(super) fn load(&self, source: &Source) -> Result<Journey, StudyError> {
-        let named = |name: &String| name_from(source, name);
-        let scenario = Scenario {
-            scene: named(&self.scene),
-            head: named(&self.head),
-            motion: named(&self.motion),
-            lidar: named(&self.lidar),
-            imu: named(&self.imu),
-            clock: named(&self.clock),
-            base_imu: self.base_imu.as_ref().map(named),
-            faults: self.faults.as_ref().map(named),
-            route: self.route.clone(),
-            duration_s: self.duration_s,
-            seed: Seed(0),
-        };
-        let simulation = Run::load(&scenario)?;
-        let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
-        Ok(Journey {
-            simulation,
-            estimator: Named::load(&named(&self.estimator))?,
-            timing: self.timing,
-            reference: self.reference.as_ref().map(of_reference).transpose()?,
-            ignore_manifest: self.ignore_manifest,
-        })
     }
 }
 

@@ -68,7 +68,6 @@ pub use plan::Plan;
 pub(crate) use plan::check_folder_name;
 pub use repeat::RepeatedRun;
 pub use report::MergedReport;
-pub(super) use results::Results;
 pub use run::Shard;
 pub use runner::Runner;
 pub(super) use simulated_run::journey_figures;

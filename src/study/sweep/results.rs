@@ -1,6 +1,5 @@
 //! The results of a run, of which the measures are figures.
 
-use super::Measure;
 use crate::coverage::Coverage;
 use crate::spring::DesignMetrics;
 use zsim_estimation::Status;
@@ -46,11 +45,6 @@ pub(crate) struct Swing {
 }
 
 impl Results {
-    /// The figures of some measures; `None` for each that is not known.
-    pub(super) fn figures(&self, measures: &[Measure]) -> Vec<Option<f64>> {
-        measures.iter().map(|measure| measure.of(self)).collect()
-    }
-
     /// The status as a number: 0 good, 1 degraded, 2 lost.
     pub(super) fn status(&self) -> Option<f64> {
         let name = self.metrics.status.as_deref()?;

@@ -1,7 +1,7 @@
 //! The inputs of a run as one tree of settings: an axis of a sweep is a path into it.
 
 use super::reference_inputs::ReferenceInputs;
-use super::{BaseSpec, settings};
+use super::{BaseSpec, JourneySpec, ReferenceSpec, settings};
 use crate::StudyError;
 use crate::gains::GainsSpec;
 use crate::latency::TimingSpec;
@@ -9,12 +9,13 @@ use crate::spring::Shake;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use zsim_base::random::Seed;
 use zsim_base::spec::{self, Named, NamedSpec, Source, SpecError, name_from, to_json};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
 use zsim_estimation::EstimatorSpec;
 use zsim_motion::MotionSpec;
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use zsim_simulation::{FaultsSpec, Run};
+use zsim_simulation::{FaultsSpec, Run, Scenario};
 use zsim_world::SceneSpec;
 
 /// Inputs of a journey: the simulation, the estimator, and timing errors between them.
@@ -35,6 +36,38 @@ impl Journey {
     /// A simulation with an estimator, without timing errors.
     pub(crate) fn new(simulation: Run, estimator: Named<EstimatorSpec>) -> Self {
         Self { simulation, estimator, timing: None, reference: None, ignore_manifest: false }
+    }
+}
+
+impl JourneySpec {
+    /// Loads the specs, whose names are relative to `source`; the seed is 0.
+    ///
+    /// # Errors
+    /// If a spec is missing or invalid.
+    pub(super) fn load(&self, source: &Source) -> Result<Journey, StudyError> {
+        let named = |name: &String| name_from(source, name);
+        let scenario = Scenario {
+            scene: named(&self.scene),
+            head: named(&self.head),
+            motion: named(&self.motion),
+            lidar: named(&self.lidar),
+            imu: named(&self.imu),
+            clock: named(&self.clock),
+            base_imu: self.base_imu.as_ref().map(named),
+            faults: self.faults.as_ref().map(named),
+            route: self.route.clone(),
+            duration_s: self.duration_s,
+            seed: Seed(0),
+        };
+        let simulation = Run::load(&scenario)?;
+        let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
+        Ok(Journey {
+            simulation,
+            estimator: Named::load(&named(&self.estimator))?,
+            timing: self.timing,
+            reference: self.reference.as_ref().map(of_reference).transpose()?,
+            ignore_manifest: self.ignore_manifest,
+        })
     }
 }
 
@@ -225,7 +258,6 @@ pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zsim_base::random::Seed;
     use zsim_base::spec::{Kind, names};
 
     fn base() -> Tree {

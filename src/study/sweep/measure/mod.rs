@@ -4,6 +4,7 @@ mod table;
 
 use super::results::Results;
 use super::{BaseSpec, JourneySpec};
+use crate::spring::DesignMetrics;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Deserializer, EnumAccess, Error, VariantAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
@@ -132,6 +133,25 @@ impl Measure {
             (BaseSpec::Journey(JourneySpec { timing: None, .. }), needs) => needs != Needs::Timing,
             (BaseSpec::Journey(JourneySpec { timing: Some(_), .. }), _) => WITH_TIMING.contains(&self),
         }
+    }
+}
+
+impl Results {
+    /// The figures of some measures; `None` for each that is not known.
+    pub(super) fn figures(&self, measures: &[Measure]) -> Vec<Option<f64>> {
+        measures.iter().map(|measure| measure.of(self)).collect()
+    }
+}
+
+impl DesignMetrics {
+    /// A measure; `None` if it is not known, or has no closed form.
+    pub fn figure(&self, measure: Measure) -> Option<f64> {
+        measure.of(&Results { head: Some(*self), ..Results::default() })
+    }
+
+    /// The figure for goals and limits: infinite if it is not known.
+    pub(crate) fn cost_figure(&self, measure: Measure) -> f64 {
+        self.figure(measure).unwrap_or(f64::INFINITY)
     }
 }
 
