@@ -220,7 +220,7 @@ mod tests {
                 { "name": "point", "type": "integer" },
                 { "name": "material", "type": "string" },
                 { "name": "head.wire_diameter_mm", "type": "number", "unit": "mm" },
-                { "name": "drift_m_per_min", "type": "number", "unit": "m/min", "description": "Drift" },
+                { "name": "drift_m_per_min", "type": "number", "unit": "m/min", "description": "Drift, open loop" },
             ],
             "missingValues": [""],
             "primaryKey": ["point"],
