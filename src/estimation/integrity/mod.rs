@@ -8,8 +8,10 @@
 
 mod bound;
 mod evidence;
+mod factors;
 mod finding;
 
 pub use bound::{covariance_blocks, radius_99};
-pub use evidence::{Evidence, bound_factors, findings};
+pub use evidence::{Evidence, findings};
+pub use factors::bound_factors;
 pub use finding::{Cause, Finding, Status};
