@@ -132,6 +132,22 @@ mod tests {
     }
 
     #[test]
+    fn a_label_longer_than_its_axis_is_smaller() {
+        let long = "Position error of the base by a rigid link, root mean square, over the run (mm)";
+        let series = || Series::line("a", Colour::Truth, vec![(0.0, 0.0), (1.0, 1.0)]);
+        let charts = [("Time (s)", "Height (m)"), (long, long)].map(|(x, y)| Chart::new("", x, y).with(series()));
+        let svg = Figure::of(charts.to_vec()).svg().unwrap();
+        let size = |label: &str| {
+            // That of the vertical axis is the last.
+            let before = &svg[..svg.rfind(label).unwrap()];
+            let size = before.rsplit("font-size=\"").next().unwrap().split('"').next().unwrap();
+            size.parse::<f64>().unwrap()
+        };
+        assert_eq!(size("Time (s)"), size("Height (m)"));
+        assert!(size(long) < 0.9 * size("Time (s)"), "{} {}", size(long), size("Time (s)"));
+    }
+
+    #[test]
     fn control_characters_of_names_are_escaped() {
         let series = Series::line("a\u{1b}[31m\u{202e}\nb\u{ffff}", Colour::Truth, vec![(0.0, 0.0), (1.0, 1.0)]);
         let svg = Figure::of(vec![Chart::new("\u{7}title", "x\u{0}", "y").with(series)]).svg().unwrap();

@@ -157,8 +157,17 @@ fn grid<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -
     }
     let axes = [(frame.left, frame.top), (frame.left, frame.bottom()), (frame.right(), frame.bottom())];
     canvas.line(&axes, INK, 0.8)?;
-    canvas.text(&chart.x_label, (frame.left + frame.width / 2.0, frame.bottom() + 25.0), Anchor::Below, TEXT)?;
-    canvas.text(&chart.y_label, (frame.edge + VERTICAL_LABEL, frame.top + frame.height / 2.0), Anchor::Sideways, TEXT)
+    let (middle, centre) = (frame.left + frame.width / 2.0, frame.top + frame.height / 2.0);
+    let size = size_within(canvas, &chart.x_label, frame.width + 2.0 * RIGHT)?;
+    canvas.text(&chart.x_label, (middle, frame.bottom() + 25.0), Anchor::Below, size)?;
+    let size = size_within(canvas, &chart.y_label, frame.height + 2.0 * TOP.min(BOTTOM))?;
+    canvas.text(&chart.y_label, (frame.edge + VERTICAL_LABEL, centre), Anchor::Sideways, size)
+}
+
+/// Returns the size of a label that is at most `room` long, points: that of text, or smaller.
+fn size_within<DB: DrawingBackend>(canvas: &Canvas<DB>, label: &str, room: f64) -> Result<f64, PlotError> {
+    let length = WIDER_FONT * canvas.width_of(label, TEXT)?;
+    Ok(TEXT * (room / length).min(1.0))
 }
 
 fn heat_map<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, chart: &Chart) -> Result<(), PlotError> {
