@@ -2,7 +2,7 @@ use super::{FaultsSpec, SimulationError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Named, checked, to_json};
+use zsim_base::spec::{Named, Source, checked, name_from, to_json};
 use zsim_dynamics::HeadSpec;
 use zsim_motion::MotionSpec;
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
@@ -54,6 +54,23 @@ impl Scenario {
             route: None,
             duration_s: 120.0,
             seed: Seed(1),
+        }
+    }
+
+    /// The scenario with names of files that are relative to the folder of `source`.
+    #[must_use]
+    pub fn relative_to(self, source: &Source) -> Self {
+        let named = |name: String| name_from(source, &name);
+        Self {
+            scene: named(self.scene),
+            head: named(self.head),
+            motion: named(self.motion),
+            lidar: named(self.lidar),
+            imu: named(self.imu),
+            clock: named(self.clock),
+            base_imu: self.base_imu.map(named),
+            faults: self.faults.map(named),
+            ..self
         }
     }
 }

@@ -96,7 +96,7 @@ fn smooth_in_level_world(
 ///
 /// # Errors
 /// When the law fails, or a motor turns the head: the head is then too distant from the rest pose.
-pub fn base_by_law(head: &HeadModel, world_from_head: &Trajectory) -> Result<Vec<(Stamp, Pose)>, DynamicsError> {
+fn base_by_law(head: &HeadModel, world_from_head: &Trajectory) -> Result<Vec<(Stamp, Pose)>, DynamicsError> {
     match head.base_from_force_law(world_from_head) {
         Err(DynamicsError::BaseUnknown { .. }) if head.rigid_mount_reason().is_none() => Ok(Vec::new()),
         poses => poses,

@@ -59,7 +59,7 @@ mod truth_cursor;
 mod viewer_files;
 
 pub use atomic_file::{replace_bytes, replace_text};
-pub use base::{base_by_imu, base_by_law};
+pub use base::base_by_imu;
 pub use bound::{RecordingBound, information_bound};
 pub use cadence::Cadence;
 pub use calibration::{CalibrationSpec, recording_calibration};

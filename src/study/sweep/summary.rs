@@ -153,15 +153,21 @@ impl Sweep {
     /// A missing figure is infinite for a failed estimate, and against a reference that is lost; else it is NaN, as the drift of a
     /// run that is too short for it.
     pub(super) fn figures(&self, measure: Measure) -> Result<Vec<f64>, StudyError> {
-        let errors = self.read_merged(&self.table(), &[("error", ColumnType::Text)])?;
-        let is_failed = errors.into_iter().flat_map(Column::texts).map(|error| error.is_some());
+        if measure.is_time() {
+            let missing = if measure.is_of_estimate() { f64::INFINITY } else { f64::NAN };
+            return Ok(self.read_measure(measure)?.into_iter().map(|cell| cell.unwrap_or(missing)).collect());
+        }
+        let columns = [(measure.key(), ColumnType::Numbers), ("error", ColumnType::Text)];
+        let mut columns = self.read_merged(&self.table(), &columns)?.into_iter();
+        let cells = columns.next().map_or_else(Vec::new, Column::numbers);
+        let errors = columns.next().map_or_else(Vec::new, Column::texts);
         let missing = |is_failed: bool| match measure.needs() {
             Needs::Reference => f64::INFINITY,
             _ if is_failed && measure.is_of_estimate() => f64::INFINITY,
             _ => f64::NAN,
         };
-        let cells = self.read_measure(measure)?.into_iter().zip(is_failed);
-        Ok(cells.map(|(cell, is_failed)| cell.unwrap_or_else(|| missing(is_failed))).collect())
+        let figure = |(cell, error): (Option<f64>, Option<String>)| cell.unwrap_or_else(|| missing(error.is_some()));
+        Ok(cells.into_iter().zip(errors).map(figure).collect())
     }
 }
 

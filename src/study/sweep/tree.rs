@@ -45,25 +45,14 @@ impl JourneySpec {
     /// # Errors
     /// If a spec is missing or invalid.
     pub(super) fn load(&self, source: &Source) -> Result<Journey, StudyError> {
-        let named = |name: &String| name_from(source, name);
-        let scenario = Scenario {
-            scene: named(&self.scene),
-            head: named(&self.head),
-            motion: named(&self.motion),
-            lidar: named(&self.lidar),
-            imu: named(&self.imu),
-            clock: named(&self.clock),
-            base_imu: self.base_imu.as_ref().map(named),
-            faults: self.faults.as_ref().map(named),
-            route: self.route.clone(),
-            duration_s: self.duration_s,
-            seed: Seed(0),
-        };
-        let simulation = Run::load(&scenario)?;
+        let Self { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, .. } = self.clone();
+        let seed = Seed(0);
+        let scenario = Scenario { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, seed };
+        let simulation = Run::load(&scenario.relative_to(source))?;
         let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
         Ok(Journey {
             simulation,
-            estimator: Named::load(&named(&self.estimator))?,
+            estimator: Named::load(&name_from(source, &self.estimator))?,
             timing: self.timing,
             reference: self.reference.as_ref().map(of_reference).transpose()?,
             ignore_manifest: self.ignore_manifest,

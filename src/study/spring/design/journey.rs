@@ -37,24 +37,19 @@ impl Journeys {
         if spec.seeds.is_empty() || spec.designs == 0 {
             return Err(SpecError::about(source, "journey", "at least one seed and one design are required").into());
         }
-        let named = |name: &String| name_from(source, name);
-        let estimator = Named::load(&named(&spec.estimator))?;
-        let of_seed = |seed: &u64| {
-            let scenario = Scenario {
-                scene: named(&spec.scene),
-                head: named(&design.head),
-                motion: named(&spec.motion),
-                lidar: named(&design.lidar),
-                imu: named(&spec.imu),
-                clock: named(&spec.clock),
-                base_imu: None,
-                faults: None,
-                route: spec.route.clone(),
-                duration_s: spec.duration_s,
-                seed: Seed(*seed),
-            };
-            Ok(Journey::new(Run::load(&scenario)?, estimator.clone()))
+        let estimator = Named::load(&name_from(source, &spec.estimator))?;
+        let scenario = Scenario {
+            head: design.head.clone(),
+            motion: spec.motion.clone(),
+            lidar: design.lidar.clone(),
+            imu: spec.imu.clone(),
+            clock: spec.clock.clone(),
+            route: spec.route.clone(),
+            duration_s: spec.duration_s,
+            ..Scenario::in_scene(&spec.scene)
         };
+        let run = Run::load(&scenario.relative_to(source))?;
+        let of_seed = |seed: &u64| Journey::new(Run { seed: Seed(*seed), ..run.clone() }, estimator.clone());
         let mut measures: Vec<Measure> = measures.filter(|measure| measure.needs_journey()).collect();
         if measures.iter().any(|measure| measure.is_of_estimate()) {
             measures.push(Measure::STATUS);
@@ -63,7 +58,7 @@ impl Journeys {
         measures.sort_unstable();
         measures.dedup();
         Ok(Self {
-            journeys: spec.seeds.iter().map(of_seed).collect::<Result<_, StudyError>>()?,
+            journeys: spec.seeds.iter().map(of_seed).collect(),
             measures,
             limit: LimitSpec { time_s: spec.time_limit_s, memory_mib: u64::MAX },
             designs: spec.designs,

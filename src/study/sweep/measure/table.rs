@@ -160,9 +160,9 @@ measures! {
     /// Time until 90 % of `fraction_seen` was observed, s.
     covered_s: Swing |r| Some(r.swing.as_ref()?.coverage.covered_s) => ("cover time", "Time to 90 % of the coverage", S);
     /// Beams per steradian and second, mean over the observed part of the sphere.
-    density_per_sr_s: Swing |r| Some(r.swing.as_ref()?.coverage.density_per_sr_s.mean) => ("density", "Beam density, mean of the observed part", PER_SR_S);
-    /// Vertical field of view, degrees. In a journey: from the 2.5 % to the 97.5 % quantile of the forward beam's
-    /// elevation. In closed form: twice the head's pitch amplitude.
+    density_per_sr_s: Swing |r| Some(r.swing.as_ref()?.coverage.density_per_sr_s.mean) => ("density", "Beam density, mean", PER_SR_S);
+    /// Elevation range of the forward beam, degrees. In a journey: from the 2.5 % to the 97.5 % quantile. In closed form: twice the
+    /// head's pitch amplitude.
     field_of_view_deg: SwingOrHead |r| r.swing.as_ref().map(|swing| swing.coverage.field_of_view_deg).or(r.head.map(|head| head.field_of_view_deg)) => ("view", "Elevation range of the forward beam", DEG);
     /// Maximum angular rate on an axis of the gyroscope, degrees/s.
     rate_deg_per_s: SwingOrHead |r| r.swing.as_ref().map(|swing| swing.coverage.gyro.most_deg_per_s).or(r.head.map(|head| head.rate_deg_per_s)) => ("rate", "Maximum rate", DEG_PER_S);
@@ -178,8 +178,8 @@ measures! {
     rocking_hz: Head |r| Some(r.head?.rocking_hz) => ("rocking", "Rocking frequency", HZ);
     /// Peak gain, head over base: of the pitch rate in closed form, along or about the axis of a gain measurement.
     peak_gain: Head |r| r.peak_gain.or(r.head.map(|head| head.peak_gain)) => ("gain", "Peak gain", ONE);
-    /// Static compression of the spring under the head's weight, mm.
-    sag_mm: Head |r| r.head?.sag_mm => ("sag", "Static compression, negative for extension", MM_AS_IS);
+    /// Static compression of the spring under the head's weight, mm; negative for an extension.
+    sag_mm: Head |r| r.head?.sag_mm => ("sag", "Static compression", MM_AS_IS);
     /// Mass of the spring's active wire, g.
     spring_mass_g: Head |r| r.head?.spring_mass_g => ("mass", "Mass of the spring", G);
     /// Maximum stress in the wire over the yield strength.
