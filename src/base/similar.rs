@@ -1,11 +1,11 @@
-//! Finds the name that a misspelt one probably stands for.
+//! Finds the name that a misspelt one probably means.
 
 use crate::unit::split_unit;
 
-/// Shortest beginning of a name that stands for it, characters.
+/// Shortest beginning that is taken for a name, characters.
 const MIN_BEGINNING: usize = 3;
 
-/// Returns the candidate that `name` probably stands for: it differs by upper case only, or by its unit only; a few letters
+/// Returns the candidate that `name` probably means: it differs by upper case only, or by its unit only; a few letters
 /// are misspelt; or it is the shortest one that begins with `name`.
 fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let candidates: Vec<&str> = candidates.into_iter().collect();
@@ -31,7 +31,7 @@ fn misspelt<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     (3 * distance <= name.chars().count()).then_some(nearest)
 }
 
-/// Whether two names are equal without their digits, as those of two figures: one does not stand for the other.
+/// Whether two names are equal without their digits, as those of two figures: one is not the other misspelt.
 fn differs_by_digits_only(name: &str, other: &str) -> bool {
     let letters = |text: &str| text.to_lowercase().replace(|c: char| c.is_ascii_digit(), "");
     letters(name) == letters(other)
@@ -50,7 +50,7 @@ fn begun<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     }
 }
 
-/// Returns `did you mean NAME?` for the candidate that `name` probably stands for.
+/// Returns `did you mean NAME?` for the candidate that `name` probably means.
 pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     nearest(name, candidates).map(|nearest| format!("did you mean {nearest}?"))
 }

@@ -77,10 +77,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         head_trajectory.len()
     );
     let truth = arguments.truth.as_deref().map(true_base).transpose()?;
-    let by_spring = match &arguments.base_imu {
-        Some(_) => Some(zsim_study::base_by_law(&head, &head_trajectory)?),
-        None => by_force_law(&head, &head_trajectory, global)?,
-    };
+    let by_spring = by_force_law(&head, &head_trajectory, global)?;
     let by_imu = arguments.base_imu.as_deref().map(|recording| by_imu(recording, arguments, &head, &head_trajectory));
     let by_imu = by_imu.transpose()?;
 

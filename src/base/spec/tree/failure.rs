@@ -122,7 +122,7 @@ impl Error for Failure {
     }
 }
 
-/// The expected name that `found` probably stands for, in brackets; empty if there is none.
+/// The expected name that `found` probably means, in brackets; empty if there is none.
 fn similar(found: &str, expected: &[&str]) -> String {
     did_you_mean(found, expected.iter().copied()).map_or_else(String::new, |question| format!(" ({question})"))
 }
