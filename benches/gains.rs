@@ -6,10 +6,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use zsim::dynamics::{HeadModel, LinkageSpec, load};
 use zsim::elasticity::SpringSpec;
+use zsim::head::gains::{GainPlan, GainWatch, gain_curves};
+use zsim::head::spring::{MISSION_HOURS, Shake, closed_form};
 use zsim::spec::{Kind, find, parse};
-use zsim::study::gains::{GainPlan, GainWatch, gain_curves};
-use zsim::study::spring::design::{DesignSearch, DesignSpec};
-use zsim::study::spring::{MISSION_HOURS, Shake, closed_form};
+use zsim::study::design::{DesignSearch, DesignSpec};
 
 fn design_points(c: &mut Criterion) {
     let (spec, source) = load("handheld").unwrap();

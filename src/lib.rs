@@ -61,7 +61,7 @@
 //! - Input and output: [recording].
 //! - Simulation: [world], [motion], [dynamics], [sensors], [simulation].
 //! - Estimation: [estimation], [evaluation].
-//! - Applications: [report] and [study], with the feature `studies` (on by default).
+//! - Applications: [report], [run], [head] and [study], with the feature `studies` (on by default).
 //!
 //! Simulation and estimation do not depend on each other: the manifest of a crate lists those that it may use.
 
@@ -70,10 +70,14 @@ pub use zsim_dynamics as dynamics;
 pub use zsim_elasticity as elasticity;
 pub use zsim_estimation as estimation;
 pub use zsim_evaluation as evaluation;
+#[cfg(feature = "studies")]
+pub use zsim_head as head;
 pub use zsim_motion as motion;
 pub use zsim_recording as recording;
 #[cfg(feature = "studies")]
 pub use zsim_report as report;
+#[cfg(feature = "studies")]
+pub use zsim_run as run;
 pub use zsim_sensors as sensors;
 pub use zsim_simulation as simulation;
 #[cfg(feature = "studies")]

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
-use zsim::study::{ProgressMonitor, Stage, StudyEvent};
+use zsim::run::{ProgressMonitor, RunEvent, Stage};
 
 /// Interval between two checks for Ctrl-C, and between two reports of progress.
 const POLL: Duration = Duration::from_millis(50);
@@ -39,9 +39,9 @@ impl Progress {
 
     /// Runs `work` with a monitor that reports here.
     pub fn monitored<T>(&self, work: impl FnOnce(&mut ProgressMonitor) -> T) -> T {
-        let mut report = |event: StudyEvent| match event {
-            StudyEvent::Progress { stage, fraction: Some(fraction), .. } => self.set(stage_name(stage), fraction),
-            StudyEvent::Note(note) => {
+        let mut report = |event: RunEvent| match event {
+            RunEvent::Progress { stage, fraction: Some(fraction), .. } => self.set(stage_name(stage), fraction),
+            RunEvent::Note(note) => {
                 self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.to_owned());
             }
             _ => {}

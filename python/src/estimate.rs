@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use zsim::estimation;
 use zsim::recording::{Reader, TopicPreference, read_tum};
 use zsim::report::Metrics;
-use zsim::study::{CalibrationSpec, EstimateOptions, estimate_recording};
+use zsim::run::{CalibrationSpec, EstimateOptions, estimate_recording};
 
 /// Settings of an estimate, JSON.
 #[derive(Deserialize)]

@@ -7,7 +7,9 @@ use zsim::dynamics::DynamicsError;
 use zsim::estimation::EstimationError;
 use zsim::evaluation::EvaluationError;
 use zsim::geometry::TrajectoryError;
+use zsim::head::HeadError;
 use zsim::recording::RecordingError;
+use zsim::run::RunError;
 use zsim::simulation::SimulationError;
 use zsim::spec::SpecError;
 use zsim::study::StudyError;
@@ -56,35 +58,31 @@ fn sentences(error: &dyn std::error::Error) -> String {
     text
 }
 
-impl From<StudyError> for Failure {
-    fn from(error: StudyError) -> Self {
-        if error.is_invalid_input() { Self::input(sentences(&error)) } else { Self::other(sentences(&error)) }
-    }
+/// Errors that know whether the input is invalid.
+macro_rules! judged {
+    ($($error:ty),+) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                if error.is_invalid_input() { Self::input(sentences(&error)) } else { Self::other(sentences(&error)) }
+            }
+        })+
+    };
 }
 
-impl From<SimulationError> for Failure {
-    fn from(error: SimulationError) -> Self {
-        StudyError::from(error).into()
-    }
+judged!(RunError, HeadError, StudyError);
+
+/// Errors of the rooms below a run.
+macro_rules! of_run {
+    ($($error:ty),+) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                RunError::from(error).into()
+            }
+        })+
+    };
 }
 
-impl From<EstimationError> for Failure {
-    fn from(error: EstimationError) -> Self {
-        StudyError::from(error).into()
-    }
-}
-
-impl From<DynamicsError> for Failure {
-    fn from(error: DynamicsError) -> Self {
-        StudyError::from(error).into()
-    }
-}
-
-impl From<SpecError> for Failure {
-    fn from(error: SpecError) -> Self {
-        StudyError::from(error).into()
-    }
-}
+of_run!(SimulationError, EstimationError, DynamicsError, SpecError);
 
 impl From<RecordingError> for Failure {
     fn from(error: RecordingError) -> Self {

@@ -15,7 +15,7 @@ use std::thread;
 use tempfile::TempDir;
 use zsim::measurement::Measurement;
 use zsim::recording::{Reader, TopicPreference};
-use zsim::study::{CalibrationSpec, recording_calibration};
+use zsim::run::{CalibrationSpec, recording_calibration};
 use zsim::time::{Span, Stamp};
 
 /// A recording in a file.

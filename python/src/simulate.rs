@@ -7,8 +7,8 @@ use crate::recording::Recording;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use zsim::recording::other_format;
+use zsim::run::record;
 use zsim::simulation::{Scenario, Simulation};
-use zsim::study::record;
 
 /// Simulates the scenario, JSON, into the recording `path`, or into a temporary file.
 #[pyfunction]

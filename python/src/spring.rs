@@ -10,12 +10,12 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 use zsim::dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
 use zsim::elasticity::SpringSpec;
+use zsim::head::coverage::CoveragePlan;
+use zsim::head::gains::{AXES, GainCurve, GainPlan, GainWatch, axis_name, gain_curve};
+use zsim::head::spring::{Shake, SpringReport, spring_report};
 use zsim::random::Seed;
 use zsim::sensors::{Imu, Lidar};
 use zsim::spec::{Kind, Source, find, parse};
-use zsim::study::coverage::CoveragePlan;
-use zsim::study::gains::{AXES, GainCurve, GainPlan, GainWatch, axis_name, gain_curve};
-use zsim::study::spring::{Shake, SpringReport, spring_report};
 
 /// Settings of a spring, JSON.
 #[derive(Deserialize)]

@@ -6,6 +6,7 @@
 pub mod files;
 pub mod geometry;
 pub mod measurement;
+pub mod parallel;
 pub mod ply;
 pub mod printable;
 pub mod random;

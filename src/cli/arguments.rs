@@ -9,8 +9,8 @@ use zsim_base::geometry::{Pose, Rotation, Route, Vector};
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, find};
 use zsim_estimation::{self, EstimatorSpec};
+use zsim_run::{CalibrationSpec, CloudFormat, CloudOptions, EstimateOptions};
 use zsim_simulation::Scenario;
-use zsim_study::{CalibrationSpec, CloudFormat, CloudOptions, EstimateOptions};
 
 /// Arguments that every command accepts.
 #[derive(Args)]

@@ -6,7 +6,7 @@ pub(super) use super::signals::{end_polling, stop_flag};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use zsim_study::{Stage, StudyEvent};
+use zsim_run::{RunEvent, Stage};
 
 /// Number of steps of a bar.
 const STEPS: u64 = 1000;
@@ -25,14 +25,14 @@ impl Bars {
     }
 
     /// Displays an event of an experiment.
-    pub(super) fn update(&mut self, event: StudyEvent) {
+    pub(super) fn update(&mut self, event: RunEvent) {
         if self.quiet {
             return;
         }
         match event {
-            StudyEvent::Data(_) => {}
-            StudyEvent::Note(text) => self.note(text),
-            StudyEvent::Progress { stage, fraction, done_s } => {
+            RunEvent::Data(_) => {}
+            RunEvent::Note(text) => self.note(text),
+            RunEvent::Progress { stage, fraction, done_s } => {
                 let bar = self.bar_of(stage);
                 bar.set_fraction(fraction);
                 if done_s > 0.0 {

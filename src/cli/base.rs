@@ -139,7 +139,7 @@ fn by_imu(
     let reader = Reader::open(recording)?;
     let record = reader.base_imu(arguments.base_imu_topic.as_deref())?;
     let offset_s = arguments.clock_offset_ms.map(|ms| ms * 1e-3);
-    let estimate = zsim_study::base_by_imu(head, head_trajectory, &reader, &record, offset_s);
+    let estimate = zsim_run::base_by_imu(head, head_trajectory, &reader, &record, offset_s);
     Ok((estimate.with_context(|| recording.display().to_string())?, record.loss))
 }
 

@@ -7,9 +7,10 @@ use super::{Completion, output};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim_base::files::replace_text;
 use zsim_evaluation::MapKnowledge;
 use zsim_recording::Reader;
-use zsim_study::{Manifest, ProgressMonitor, RecordingBound, information_bound, replace_text};
+use zsim_run::{Manifest, ProgressMonitor, RecordingBound, information_bound};
 use zsim_world::World;
 
 /// Compute the Cramer-Rao bound of a recording: the accuracy that no estimator can exceed

@@ -15,8 +15,8 @@ use zsim_motion::MotionSpec;
 use zsim_sensors::{Clocks, ClocksSpec, Imu, ImuSpec, Lidar, LidarSpec};
 use zsim_simulation::{EPOCH, Faults, FaultsSpec};
 use zsim_study::StudyError;
+use zsim_study::design::{DesignSearch, DesignSpec};
 use zsim_study::reproduction::ExperimentSpec;
-use zsim_study::spring::design::{DesignSearch, DesignSpec};
 use zsim_study::sweep::{Plan, SweepSpec};
 use zsim_world::{SceneSpec, World, WorldError};
 

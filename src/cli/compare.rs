@@ -8,10 +8,10 @@ use anyhow::{Context, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim_base::files::replace_text;
 use zsim_base::geometry::Trajectory;
 use zsim_base::printable::printable_name;
 use zsim_evaluation::{Errors, TrajectoryErrors};
-use zsim_study::replace_text;
 
 /// Files of --out.
 const FILES: [&str; 5] = ["comparison.json", "errors.svg", "errors.png", "trajectories.svg", "trajectories.png"];

@@ -5,12 +5,12 @@ use super::bars::WorkBar;
 use super::{Completion, coverage_text, output, quantity};
 use clap::Args;
 use std::path::Path;
+use zsim_base::files::replace_text;
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, NamedSpec, find};
 use zsim_dynamics::{self, ContactWatch, HeadModel, HeadState};
+use zsim_head::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
-use zsim_study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
-use zsim_study::replace_text;
 
 /// Compute the coverage of the sphere by a lidar on a moving head: fraction, density and time, and the required gyroscope
 /// range

@@ -1,6 +1,6 @@
 //! Table of the coverage of a lidar.
 
-use zsim_study::coverage::Coverage;
+use zsim_head::coverage::Coverage;
 
 /// Rows of the table: name and value.
 pub(super) fn rows(seen: &Coverage) -> Vec<(&'static str, String)> {

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use zsim_base::geometry::Pose;
 use zsim_recording::{Reader, TopicPreference};
 use zsim_report::page::LivePage;
-use zsim_study::{self, EstimateOptions, MapOptions, ProgressMonitor, StudyEvent};
+use zsim_run::{EstimateOptions, MapOptions, ProgressMonitor, RunEvent};
 
 /// Estimate trajectory and map from a recording of any program
 ///
@@ -83,17 +83,17 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let folder = output::folder(&wanted, arguments.out.force)?;
     let files = [Some(arguments.recording.clone()), arguments.map.clone(), arguments.calibration.clone()];
     let inputs: Vec<PathBuf> = files.into_iter().chain([arguments.estimator.settings.file()]).flatten().collect();
-    let written: Vec<PathBuf> = zsim_study::estimate_files().iter().map(|name| folder.join(name)).collect();
+    let written: Vec<PathBuf> = zsim_run::estimate_files().iter().map(|name| folder.join(name)).collect();
     output::check_not_inputs(&inputs, &written)?;
 
     let mut bars = Bars::new(global);
     full_run::note_other_folder(&folder, &wanted, &bars);
-    let mut report = |event: StudyEvent| {
+    let mut report = |event: RunEvent| {
         live.iter_mut().for_each(|live| live.observe(&event));
         bars.update(event);
     };
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = zsim_study::estimate_recording(&reader, &selection, &folder, &options, &mut watch);
+    let outcome = zsim_run::estimate_recording(&reader, &selection, &folder, &options, &mut watch);
     bars.finish();
     live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| full_run::print_partial_results(&folder))?;

@@ -5,8 +5,11 @@ use super::signals;
 use super::usage::Usage;
 use std::error::Error;
 use std::process::ExitCode;
+use zsim_base::parallel::Stopped;
 use zsim_base::spec::SpecError;
+use zsim_head::HeadError;
 use zsim_motion::MotionError;
+use zsim_run::RunError;
 use zsim_simulation::SimulationError;
 use zsim_study::StudyError;
 use zsim_world::WorldError;
@@ -30,7 +33,10 @@ pub(super) fn report(error: &anyhow::Error) -> ExitCode {
 }
 
 fn is_stopped(error: &(dyn Error + 'static)) -> bool {
-    error.downcast_ref::<StudyError>().is_some_and(|error| matches!(error, StudyError::Stopped))
+    error.is::<Stopped>()
+        || matches!(error.downcast_ref(), Some(RunError::Stopped(_)))
+        || matches!(error.downcast_ref(), Some(HeadError::Stopped(_)))
+        || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_stopped)
 }
 
 fn is_invalid_input(error: &(dyn Error + 'static)) -> bool {
@@ -40,5 +46,7 @@ fn is_invalid_input(error: &(dyn Error + 'static)) -> bool {
         || error.is::<MotionError>()
         || error.is::<Usage>()
         || error.downcast_ref::<SimulationError>().is_some_and(simulation)
+        || error.downcast_ref::<RunError>().is_some_and(RunError::is_invalid_input)
+        || error.downcast_ref::<HeadError>().is_some_and(HeadError::is_invalid_input)
         || error.downcast_ref::<StudyError>().is_some_and(StudyError::is_invalid_input)
 }

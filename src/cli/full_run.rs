@@ -8,9 +8,10 @@ use super::{message, output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim_report::page::LivePage;
 use zsim_report::{self, Metrics};
+use zsim_run::{EstimateResult, ProgressMonitor, RunEvent};
 use zsim_simulation::{Outputs, Simulation};
-use zsim_study::{self, EstimateResult, ProgressMonitor, StudyEvent};
 
 #[derive(Args)]
 pub(super) struct Arguments {
@@ -32,23 +33,23 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let options = arguments.estimator.options()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
-    let mut live = arguments.live.start(|| zsim_study::live_page(&simulation))?;
+    let mut live = arguments.live.start(|| LivePage::of_simulation(&simulation))?;
     let mut bars = Bars::new(global);
     recording_size::check(&simulation, Outputs::All, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let written: Vec<PathBuf> = zsim_study::full_run_files().iter().map(|name| folder.join(name)).collect();
+    let written: Vec<PathBuf> = zsim_run::full_run_files().iter().map(|name| folder.join(name)).collect();
     let inputs = arguments.scenario.inputs(scene).into_iter().chain(arguments.estimator.settings.file());
     let inputs: Vec<PathBuf> = inputs.chain(simulation.world().mesh_files().iter().cloned()).collect();
     output::check_not_inputs(&inputs, &written)?;
     note_other_folder(&folder, &wanted, &bars);
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
-    let mut report = |event: StudyEvent| {
+    let mut report = |event: RunEvent| {
         live.iter_mut().for_each(|live| live.observe(&event));
         bars.update(event);
     };
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = zsim_study::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
+    let outcome = zsim_run::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
     bars.finish();
     live.into_iter().for_each(|live| live.finish(&outcome, &folder));
     let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;

@@ -8,15 +8,15 @@ use super::{Completion, output, quantity};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim_base::files::replace_text;
 use zsim_base::files::subfolder;
 use zsim_base::random::Seed;
 use zsim_dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
-use zsim_motion::Axis;
-use zsim_study::gains::{
+use zsim_head::gains::{
     AXES, GainCurve, GainPlan, GainWatch, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure,
     min_coherence, page, peak_table, swing_csv, swing_figure, swing_study, with_damping,
 };
-use zsim_study::replace_text;
+use zsim_motion::Axis;
 
 /// Measure a head's gain curves: head motion over base motion by frequency, from simulation and in closed form
 ///
@@ -165,7 +165,7 @@ fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
     let dash = || "-".to_owned();
     let mut words = peak_table(curves).body();
     for study in swings {
-        let row = |p: &zsim_study::gains::SwingPoint| {
+        let row = |p: &zsim_head::gains::SwingPoint| {
             let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
             vec![
                 format!("{}, {:.1} deg", zsim_report::quantity_name(axis_name(study.axis)), p.swing_rms_deg),

@@ -7,7 +7,7 @@ use clap::{Args, Command};
 use clap_mangen::Man;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use zsim_study::replace_text;
+use zsim_base::files::replace_text;
 
 /// Write the manual pages of all commands: zsim.1, zsim-simulate.1, zsim-sweep-plan.1, ...
 ///

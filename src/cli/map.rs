@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let estimator_file = spec_file(Kind::Estimator, &merge.estimator);
     let inputs: Vec<PathBuf> = [merge.first.clone(), merge.second.clone()].into_iter().chain(estimator_file).collect();
     output::check_not_inputs(&inputs, std::slice::from_ref(out))?;
-    let merged = zsim_study::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, out)?;
+    let merged = zsim_run::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
     let (position, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());

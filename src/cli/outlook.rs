@@ -4,7 +4,7 @@ use serde::Serialize;
 use zsim_estimation::EstimatorSpec;
 use zsim_recording::{Reader, RecordingInfo, Selection, TopicInfo, TopicPreference, UnusedTopic};
 use zsim_report::wrapped;
-use zsim_study::{CalibrationSpec, recording_calibration};
+use zsim_run::{CalibrationSpec, recording_calibration};
 
 /// What an estimate without options would do with a recording.
 #[derive(Debug, Serialize)]

@@ -2,9 +2,9 @@
 
 use anyhow::ensure;
 use std::path::Path;
+use zsim_run::free_bytes;
 use zsim_sensors::{Imu, Lidar};
 use zsim_simulation::{Outputs, STEP_S, Simulation};
-use zsim_study::free_bytes;
 
 /// Bytes of a beam in a `LaserScan` (range and intensity) and in a `PointCloud2`, compressed, as measured with the
 /// shipped lidars in the shipped office: 8 and 12 to 16.
@@ -66,8 +66,8 @@ fn lidar_bytes_per_s(lidar: &Lidar) -> f64 {
 mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
+    use zsim_run::{ProgressMonitor, record, record_imus};
     use zsim_simulation::Scenario;
-    use zsim_study::{ProgressMonitor, record, record_imus};
 
     #[test]
     fn the_size_of_the_imu_alone_is_about_that_of_a_recording() {

@@ -6,8 +6,8 @@ use super::{Completion, full_run, output};
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
+use zsim_run::ProgressMonitor;
 use zsim_study::sweep::{Measure, RepeatedRun, Shard, Sweep};
-use zsim_study::{ProgressMonitor, StudyError};
 
 /// Repeat one run of a sweep with all its files: recording, trajectories, metrics, report.html
 ///
@@ -73,7 +73,7 @@ pub(super) fn keep_runs(sweep: &Sweep, shard: Shard, global: &Global) -> anyhow:
         let folder = output::folder(&sweep.create_run_folder(*number)?, true)?;
         let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |_| () };
         match sweep.repeat(*number, &folder, &mut watch) {
-            Err(error @ StudyError::Stopped) => return Err(error.into()),
+            Err(error) if error.is_stopped() => return Err(error.into()),
             Err(error) if !global.quiet => bar.note(&format!("run {number} has no page: {error}")),
             _ => {}
         }

@@ -8,8 +8,8 @@ use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use zsim_base::files::replace_text;
 use zsim_base::files::subfolder;
-use zsim_study::replace_text;
 use zsim_study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_page, paper_table};
 use zsim_study::sweep::Runner;
 

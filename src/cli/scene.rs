@@ -6,9 +6,9 @@ use super::{Completion, message, output, quantity};
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use zsim_base::files::{replace_bytes, replace_text};
 use zsim_base::spec::Kind;
-use zsim_study::scene;
-use zsim_study::{replace_bytes, replace_text};
+use zsim_report::scene;
 use zsim_world::{MeshFormat, World};
 
 /// Look at a scene, and export it for other programs

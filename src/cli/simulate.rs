@@ -12,8 +12,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim_base::files;
 use zsim_recording::write_rosbag2_metadata;
+use zsim_run::{ProgressMonitor, ViewerFiles};
 use zsim_simulation::{Outputs, Simulation, SimulationSummary};
-use zsim_study::{self, ProgressMonitor, ViewerFiles};
 
 /// Simulate and record: an MCAP file with the truth inside, and next to it the true trajectory and files for viewers
 #[derive(Args)]
@@ -65,8 +65,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     simulation.world().notes().iter().for_each(|note| bars.note(note));
     let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut |event| bars.update(event) };
     let recorded = match files.companion(Companion::Truth) {
-        Some(truth) => zsim_study::record(&simulation, files.recording(), &truth, arguments.truth_tf, &mut watch),
-        None => zsim_study::record_imus(&simulation, files.recording(), &mut watch),
+        Some(truth) => zsim_run::record(&simulation, files.recording(), &truth, arguments.truth_tf, &mut watch),
+        None => zsim_run::record_imus(&simulation, files.recording(), &mut watch),
     };
     bars.finish();
     let summary = recorded.inspect_err(|_| super::full_run::print_partial_results(files.recording()))?;

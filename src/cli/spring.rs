@@ -5,15 +5,15 @@ use super::bars::WorkBar;
 use super::{Completion, output, quantity, spring_text};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
+use zsim_base::files::{replace_bytes, replace_text};
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find};
 use zsim_dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
 use zsim_elasticity::SpringSpec;
+use zsim_head::coverage::{CoveragePlan, coverage_figure};
+use zsim_head::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
-use zsim_study::coverage::{CoveragePlan, coverage_figure};
-use zsim_study::spring::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
-use zsim_study::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
+use zsim_study::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
 use zsim_study::sweep::SweepSpec;
-use zsim_study::{replace_bytes, replace_text};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one

@@ -2,9 +2,9 @@
 
 use super::coverage_text;
 use std::collections::{BTreeMap, BTreeSet};
+use zsim_head::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
 use zsim_report::{digits, table, wrapped};
-use zsim_study::spring::design::{DesignStudy, VerifiedDesign};
-use zsim_study::spring::{DesignMetrics, ShakeResponse, SpringReport, mode_table, properties, stiffness_table};
+use zsim_study::design::{DesignStudy, VerifiedDesign};
 use zsim_study::sweep::Measure;
 
 /// The report on a spring.

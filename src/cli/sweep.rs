@@ -11,7 +11,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim_base::spec::{Kind, NamedSpec, SpecError, find};
-use zsim_study::spring::design::DesignSpec;
+use zsim_study::design::DesignSpec;
 use zsim_study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepSpec, SweepStatus, limit_process};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge

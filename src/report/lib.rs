@@ -13,6 +13,7 @@ pub mod plot;
 mod profile;
 mod quantity;
 mod rows;
+pub mod scene;
 mod sensors;
 mod table;
 mod verdict;

@@ -1,51 +1,31 @@
 use std::path::{Path, PathBuf};
-use zsim_base::signal::SignalError;
+use zsim_base::files::FileError;
+use zsim_base::parallel::Stopped;
 use zsim_base::spec::SpecError;
 use zsim_dynamics::DynamicsError;
 use zsim_estimation::EstimationError;
 use zsim_evaluation::EvaluationError;
+use zsim_head::HeadError;
 use zsim_motion::MotionError;
 use zsim_recording::RecordingError;
 use zsim_report::plot::PlotError;
+use zsim_run::RunError;
 use zsim_simulation::SimulationError;
 use zsim_world::WorldError;
 
-/// Error of an experiment.
+/// Error of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The simulation failed at the start or during the run.
+    /// A run failed: its simulation, estimate or evaluation, or the writing of its files.
     #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A file could not be written or read.
+    Run(#[from] RunError),
+    /// A study of a head failed.
     #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// An estimate or a run cannot be evaluated.
-    #[error(transparent)]
-    Evaluation(#[from] EvaluationError),
-    /// The estimation failed.
-    #[error(transparent)]
-    Estimation(#[from] EstimationError),
+    Head(#[from] HeadError),
     /// A spec is missing or invalid.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// The head cannot be modelled, or its simulation failed.
-    #[error(transparent)]
-    Dynamics(Box<DynamicsError>),
-    /// The motion cannot be built.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    /// A recorded signal cannot be analysed.
-    #[error(transparent)]
-    Signal(#[from] SignalError),
-    /// A YAML calibration is invalid.
-    #[error("{name}: {problem}")]
-    Calibration {
-        /// Name of the file.
-        name: String,
-        /// The problem.
-        problem: String,
-    },
-    /// The settings of an experiment are inconsistent or cannot be met.
+    /// The settings of a study are inconsistent or cannot be met.
     #[error("{what}: {message}")]
     Plan {
         /// Name of the setting.
@@ -56,17 +36,12 @@ pub enum StudyError {
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// The metrics could not be written as JSON.
-    #[error("the metrics cannot be written as JSON: {0}")]
+    /// Figures could not be written as JSON.
+    #[error("the figures cannot be written as JSON: {0}")]
     Figures(#[from] serde_json::Error),
     /// A file or folder could not be read, created or written.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// Path of the file or folder.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A table is damaged.
     #[error("{}: {message}", path.display())]
     Table {
@@ -100,50 +75,49 @@ pub enum StudyError {
         /// The output folder.
         folder: PathBuf,
     },
-    /// The experiment was stopped.
-    #[error("stopped; completed files can be read")]
-    Stopped,
+    /// The study was stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
-impl From<WorldError> for StudyError {
-    fn from(error: WorldError) -> Self {
-        SimulationError::from(error).into()
-    }
+/// Errors of the rooms below become those of a run or of a head.
+macro_rules! from_below {
+    ($($below:ty => $room:ty),+ $(,)?) => {
+        $(impl From<$below> for StudyError {
+            fn from(error: $below) -> Self {
+                <$room>::from(error).into()
+            }
+        })+
+    };
 }
 
-impl From<DynamicsError> for StudyError {
-    fn from(error: DynamicsError) -> Self {
-        Self::Dynamics(Box::new(error))
-    }
+from_below! {
+    WorldError => RunError,
+    SimulationError => RunError,
+    RecordingError => RunError,
+    EvaluationError => RunError,
+    EstimationError => RunError,
+    DynamicsError => HeadError,
+    MotionError => HeadError,
 }
 
 impl StudyError {
-    pub(super) fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + use<> {
-        let path = path.to_owned();
-        move |source| Self::File { path, source }
-    }
-
     pub(super) fn table(path: &Path) -> impl FnOnce(String) -> Self + use<> {
         let path = path.to_owned();
         move |message| Self::Table { path, message }
     }
 
+    /// Whether the study was stopped on request.
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, Self::Stopped(_) | Self::Run(RunError::Stopped(_)) | Self::Head(HeadError::Stopped(_)))
+    }
+
     /// Whether the input is invalid (a spec, a setting), as opposed to a failure during the run.
     pub fn is_invalid_input(&self) -> bool {
         match self {
-            Self::Spec(_) | Self::Motion(_) | Self::Plan { .. } | Self::FolderMismatch { .. } => true,
-            Self::Dynamics(error) => !matches!(**error, DynamicsError::Diverged { .. }),
-            Self::Estimation(error) => {
-                matches!(error, EstimationError::Setting { .. } | EstimationError::Calibration(_))
-            }
-            Self::Simulation(error) => {
-                let failed = match error {
-                    SimulationError::Dynamics(error) => matches!(**error, DynamicsError::Diverged { .. }),
-                    SimulationError::Sink(_) => true,
-                    _ => false,
-                };
-                !failed
-            }
+            Self::Spec(_) | Self::Plan { .. } | Self::FolderMismatch { .. } => true,
+            Self::Run(error) => error.is_invalid_input(),
+            Self::Head(error) => error.is_invalid_input(),
             _ => false,
         }
     }

@@ -3,9 +3,9 @@
 use crate::command::{exits_with, run, zsim};
 use std::path::Path;
 use zsim::estimation::EstimatorSpec;
+use zsim::head::gains::{GainPlan, GainsSpec};
 use zsim::sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use zsim::spec::{Kind, NamedSpec, Source, find};
-use zsim::study::gains::{GainPlan, GainsSpec};
 use zsim::study::sweep::{Measure, Sampling, SweepSpec};
 use zsim::world::SceneSpec;
 

@@ -4,9 +4,9 @@ use crate::command::run;
 use serde_json::Value;
 use std::path::Path;
 use zsim::recording::{RunDescription, Writer};
+use zsim::run::Manifest;
 use zsim::simulation::{Scenario, Simulation};
 use zsim::spec::{Source, parse, to_text};
-use zsim::study::Manifest;
 
 const MANIFEST: &str = "from the recording's manifest";
 

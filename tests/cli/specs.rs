@@ -15,8 +15,8 @@ use zsim::motion::MotionSpec;
 use zsim::sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use zsim::simulation::FaultsSpec;
 use zsim::spec::{Kind, find, names, parse};
+use zsim::study::design::DesignSpec;
 use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::spring::design::DesignSpec;
 use zsim::study::sweep::SweepSpec;
 use zsim::world::SceneSpec;
 

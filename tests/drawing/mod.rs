@@ -4,21 +4,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Places of the rooms: half columns from the left, rows from the top. Every room needs one, and no arrow may cross a box.
-const PLACES: [(&str, usize, usize); 14] = [
+const PLACES: [(&str, usize, usize); 16] = [
     ("cli", 4, 0),
     ("study", 4, 1),
-    ("report", 4, 2),
-    ("simulation", 2, 3),
-    ("evaluation", 6, 3),
-    ("dynamics", 1, 4),
-    ("sensors", 4, 4),
-    ("estimation", 6, 4),
-    ("motion", 0, 5),
-    ("elasticity", 2, 5),
-    ("world", 4, 5),
-    ("recording", 0, 6),
-    ("truth", 0, 7),
-    ("base", 3, 8),
+    ("run", 4, 2),
+    ("head", 4, 3),
+    ("report", 4, 4),
+    ("simulation", 2, 5),
+    ("evaluation", 6, 5),
+    ("dynamics", 1, 6),
+    ("sensors", 4, 6),
+    ("estimation", 6, 6),
+    ("motion", 0, 7),
+    ("elasticity", 2, 7),
+    ("world", 4, 7),
+    ("recording", 0, 8),
+    ("truth", 0, 9),
+    ("base", 3, 10),
 ];
 
 /// Size of a box, distances between half columns and rows, and the margin, px.

@@ -173,7 +173,7 @@ fn invalid_motors_are_refused_with_their_line() {
 
 #[test]
 fn rigid_mounts_have_no_gains_and_no_spring() {
-    use zsim::study::gains::{GainPlan, GainWatch, gain_curves};
+    use zsim::head::gains::{GainPlan, GainWatch, gain_curves};
     for (name, because) in
         [("spinning", "a motor turns the head"), ("nodding", "a motor turns the head"), ("trawling", "screwed")]
     {

@@ -2,10 +2,10 @@
 
 use crate::dynamics::heads::shipped;
 use zsim::dynamics::{DampingSpec, HeadModel, HeadSimulation, LinkageSpec, MotorSpec, TurnSpec, load};
+use zsim::head::gains::{GainPlan, GainWatch, gain_curve};
 use zsim::motion::Axis;
 use zsim::random::Seed;
 use zsim::spec::{Kind, names};
-use zsim::study::gains::{GainPlan, GainWatch, gain_curve};
 
 /// Names of the heads with a flexible linkage.
 fn sprung() -> Vec<String> {

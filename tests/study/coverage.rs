@@ -3,10 +3,10 @@
 use std::f64::consts::{PI, TAU};
 use zsim::dynamics::{HeadModel, load};
 use zsim::geometry::{Kinematics, Pose, Rotation, Vector};
+use zsim::head::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv};
 use zsim::motion::BaseMotion;
 use zsim::sensors::Lidar;
 use zsim::spec::{Kind, find, parse};
-use zsim::study::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv};
 
 /// A base that rotates about its x axis at a constant rate.
 struct Spinner {
@@ -49,7 +49,7 @@ fn a_level_scanner_at_rest_covers_only_its_arc() {
         assert!(cell.azimuth_deg.0 <= 135.0 + 1e-9 && cell.azimuth_deg.1 >= -135.0 - 1e-9, "{cell:?}");
     }
     let ahead =
-        |cell: &&zsim::study::coverage::CoverageCell| cell.azimuth_deg.0 >= -135.0 && cell.azimuth_deg.1 <= 135.0;
+        |cell: &&zsim::head::coverage::CoverageCell| cell.azimuth_deg.0 >= -135.0 && cell.azimuth_deg.1 <= 135.0;
     let rows = 32.0 * coverage.cells.iter().filter(ahead).map(|cell| cell.beams_per_sr_s).sum::<f64>()
         / coverage.cells.iter().filter(ahead).count() as f64;
     // 1081 beams less the two at the ends, 40 times a second. A row is 4 pi / 32 sr, and 3/4 of it is ahead.

@@ -1,9 +1,9 @@
 //! Gain curves of the simulated head compared with the closed form of the linearised head.
 
 use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, LinkageSpec, load};
+use zsim::head::gains::{GainCurve, GainPlan, GainPoint, GainWatch, csv, gain_curve, gain_curves, swing_study};
 use zsim::motion::Axis;
 use zsim::spec::{Source, parse};
-use zsim::study::gains::{GainCurve, GainPlan, GainPoint, GainWatch, csv, gain_curve, gain_curves, swing_study};
 
 /// The handheld head with one damping ratio for all modes.
 fn handheld(ratio: f64) -> HeadModel {

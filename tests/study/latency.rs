@@ -2,9 +2,10 @@
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use zsim::run::timing::{ClockState, Disturbance};
 use zsim::spec::{Kind, Source, find, parse};
 use zsim::study::StudyError;
-use zsim::study::latency::{ClockState, Disturbance, LatencyResult, csv, curve_figure, map_figure, text_table};
+use zsim::study::latency::{LatencyResult, csv, curve_figure, map_figure, text_table};
 use zsim::study::reproduction::ExperimentSpec;
 use zsim::study::sweep::{AxisSpec, BaseSpec, JourneySpec, Plan, Runner, Shard, SweepSpec};
 
@@ -40,7 +41,7 @@ fn run(folder: &Path, threads: usize, stop_at: f64) -> Result<LatencyResult, Stu
 fn latency_blurs_the_cloud_clock_estimation_recovers_it_and_a_stop_changes_nothing() {
     let here = tempfile::tempdir().unwrap();
     let (cut, whole) = (here.path().join("cut"), here.path().join("whole"));
-    assert!(matches!(run(&cut, 1, 0.2), Err(StudyError::Stopped)));
+    assert!(run(&cut, 1, 0.2).is_err_and(|error| error.is_stopped()));
     let kept = std::fs::read_dir(cut.join("parts")).unwrap().count();
     assert!((1..8).contains(&kept), "{kept}");
     let study = run(&cut, 2, 2.0).unwrap();

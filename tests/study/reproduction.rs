@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
+use zsim::head::gains::with_damping;
 use zsim::motion::Axis;
-use zsim::study::StudyError;
-use zsim::study::gains::with_damping;
 use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, Verdict, fit_damping};
 use zsim::study::sweep::Runner;
 
@@ -129,7 +128,7 @@ fn a_stopped_experiment_resumes_with_the_same_result() {
     }
 
     let stopped = here.path().join("stopped");
-    assert!(matches!(pool(1).install(|| run(&stopped, Extent::Quick, 0.3)), Err(StudyError::Stopped)));
+    assert!(pool(1).install(|| run(&stopped, Extent::Quick, 0.3)).is_err_and(|error| error.is_stopped()));
     let modified = || -> BTreeMap<PathBuf, SystemTime> {
         let parts = std::fs::read_dir(stopped.join("parts")).unwrap().map(|entry| entry.unwrap());
         parts.map(|part| (part.path(), part.metadata().unwrap().modified().unwrap())).collect()

@@ -1,16 +1,16 @@
 //! Spring design by search.
 
 use zsim::dynamics::{HeadModel, LinkageSpec};
+use zsim::head::coverage::{CoveragePlan, coverage};
+use zsim::head::spring::{MISSION_HOURS, simulated};
 use zsim::random::Seed;
 use zsim::sensors::Lidar;
 use zsim::simulation::{Run, Scenario, Simulation};
 use zsim::spec::{Kind, Source, find, parse};
-use zsim::study::coverage::{CoveragePlan, coverage};
-use zsim::study::spring::design::{
+use zsim::study::design::{
     BuildLimitsSpec, CoilDesign, DesignSearch, DesignSpec, DesignStudy, SpaceSpec, WireStock, csv, pareto_figure,
     rejected_csv,
 };
-use zsim::study::spring::{MISSION_HOURS, simulated};
 use zsim::study::sweep::{Measure, pareto_set};
 
 fn load(name: &str) -> (DesignSpec, Source) {

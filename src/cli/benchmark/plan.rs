@@ -10,8 +10,9 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim_base::files;
+use zsim_base::files::replace_text;
+use zsim_run::ProgressMonitor;
 use zsim_study::sweep::{Plan, SuiteRecording};
-use zsim_study::{ProgressMonitor, replace_text};
 
 /// Simulate the recordings of a suite, with the truth apart
 ///

@@ -9,9 +9,9 @@ use crate::{Completion, message, output};
 use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use zsim_base::files::replace_text;
 use zsim_base::printable::{printable, printable_name};
 use zsim_evaluation::TrajectoryErrors;
-use zsim_study::replace_text;
 
 /// Compare the trajectories of one or more systems with the truth of a suite
 ///

@@ -6,7 +6,7 @@ use zsim_base::measurement::LidarScan;
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::{EstimatedPose, Evidence, Finding, Status, Warning, findings};
 use zsim_report::page::LiveVerdict;
-use zsim_study::{Stage, StageData, StudyEvent};
+use zsim_run::{RunEvent, Stage, StageData};
 
 /// Maximum number of returns that are copied from a scan.
 const MAX_RETURNS: usize = 128;
@@ -59,13 +59,13 @@ pub(super) struct Framer {
 
 impl Framer {
     /// The frame of an event; `None` if the page does not need it.
-    pub(super) fn frame(&mut self, event: &StudyEvent) -> Option<Frame> {
+    pub(super) fn frame(&mut self, event: &RunEvent) -> Option<Frame> {
         let data = match event {
-            StudyEvent::Progress { stage, fraction, done_s } => {
+            RunEvent::Progress { stage, fraction, done_s } => {
                 return Some(Frame::Progress { stage: *stage, fraction: *fraction, done_s: *done_s });
             }
-            StudyEvent::Note(text) => return Some(Frame::Note((*text).to_owned())),
-            StudyEvent::Data(data) => data,
+            RunEvent::Note(text) => return Some(Frame::Note((*text).to_owned())),
+            RunEvent::Data(data) => data,
         };
         match data {
             StageData::Start { stage, calibration } => {

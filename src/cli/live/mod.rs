@@ -29,7 +29,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use zsim_base::printable::printable;
 use zsim_report::page::{LiveEnd, LivePage, LiveVerdict};
-use zsim_study::{EstimateResult, StudyError, StudyEvent};
+use zsim_run::{EstimateResult, RunError, RunEvent};
 
 /// Time between two changes of the state: pages are updated up to 20 times a second.
 const CHANGE_PERIOD: Duration = Duration::from_millis(50);
@@ -82,14 +82,14 @@ impl Live {
     }
 
     /// Passes an event of the run on to the pages.
-    pub(super) fn observe(&mut self, event: &StudyEvent) {
+    pub(super) fn observe(&mut self, event: &RunEvent) {
         if let Some(frame) = self.framer.frame(event) {
             self.queue.push(frame);
         }
     }
 
     /// Shows the end of the run, and waits until all open pages have it and the report, but at most some seconds.
-    pub(super) fn finish(self, outcome: &Result<EstimateResult, StudyError>, folder: &Path) {
+    pub(super) fn finish(self, outcome: &Result<EstimateResult, RunError>, folder: &Path) {
         self.queue.close();
         // A thread that has panicked has left a state that can still be shown.
         let _ = self.updating.join();
@@ -106,7 +106,7 @@ impl Live {
             }
             Err(error) => {
                 let sentence = match error {
-                    StudyError::Stopped => "the run was stopped".to_owned(),
+                    RunError::Stopped(_) => "the run was stopped".to_owned(),
                     error => format!("the run failed: {error}"),
                 };
                 self.shared.end(LiveEnd { sentence, report: None }, None, None);

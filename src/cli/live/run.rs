@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use zsim_base::geometry::{Pose, Vector};
 use zsim_base::time::Stamp;
 use zsim_report::page::{LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TimedPose, TruePoses, Volume};
-use zsim_study::Stage;
+use zsim_run::Stage;
 
 /// Maximum number of points and of poses in an update.
 const MAX_ITEMS: usize = 20_000;

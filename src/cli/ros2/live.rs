@@ -15,7 +15,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use zsim_base::geometry::Pose;
 use zsim_recording::TopicPreference;
-use zsim_study::MapOptions;
+use zsim_run::MapOptions;
 
 /// Estimate trajectory and map from live ROS 2 topics
 ///

@@ -15,11 +15,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
+use zsim_base::parallel::check;
 use zsim_base::time::Stamp;
 use zsim_recording::{Loss, Reader, RecordedMessage};
-use zsim_study::StudyError;
 
 /// The topic whose messages a late subscriber needs.
 const LATCHED: &str = "/tf_static";
@@ -119,7 +119,7 @@ impl Player {
         bar.set_task(if wait { "waiting for a subscriber" } else { "waiting for discovery" }.to_owned());
         let (mut since, mut is_subscribed) = (Instant::now(), false);
         while (wait && !is_subscribed) || since.elapsed() < DISCOVERY {
-            self.check_stop()?;
+            check(self.stop)?;
             if let Some(Frame::Subscribers(_, count)) = self.bridge.receive(NAP)? {
                 is_subscribed |= count > 0;
                 since = if wait { Instant::now() } else { since };
@@ -149,7 +149,7 @@ impl Player {
     /// Publishes a message at `due`.
     fn publish(&mut self, message: &RecordedMessage<'_>, due: Instant) -> anyhow::Result<()> {
         loop {
-            self.check_stop()?;
+            check(self.stop)?;
             let Some(left) = due.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) else { break };
             std::thread::sleep(left.min(NAP));
         }
@@ -159,10 +159,6 @@ impl Player {
         self.bridge.send(&Frame::Publish(self.ids[message.topic], message.cdr.to_vec()))?;
         *self.counts.entry(message.topic.to_owned()).or_default() += 1;
         Ok(())
-    }
-
-    fn check_stop(&self) -> Result<(), StudyError> {
-        if self.stop.load(Ordering::Relaxed) { Err(StudyError::Stopped) } else { Ok(()) }
     }
 }
 

@@ -24,7 +24,7 @@ use zsim_estimation::{
     EstimatedPose, EstimationError, Estimator, EstimatorSpec, Evidence, Status, Warning, WindowReport, findings,
 };
 use zsim_recording::{Diagnostic, DiagnosticLevel, Incoming, ReceivedWriter, TumWriter};
-use zsim_study::{Cadence, MapOptions};
+use zsim_run::{Cadence, MapOptions};
 
 /// Time between looks at the stop flag.
 const NAP: Duration = Duration::from_millis(100);

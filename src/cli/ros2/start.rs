@@ -10,7 +10,7 @@ use std::io::{Seek, SeekFrom};
 use std::time::{Duration, Instant};
 use zsim_base::time::Stamp;
 use zsim_recording::{FoundCalibration, Reader, ReceivedWriter, Selection, TopicPreference};
-use zsim_study::{CalibrationSpec, recording_calibration};
+use zsim_run::{CalibrationSpec, recording_calibration};
 
 /// Time of both sensors that shows how to read them, s: some periods of each, and the rest in which the estimator starts.
 const ENOUGH_S: f64 = 3.0;

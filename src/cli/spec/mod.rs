@@ -14,8 +14,8 @@ use zsim_estimation::EstimatorSpec;
 use zsim_motion::MotionSpec;
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use zsim_simulation::FaultsSpec;
+use zsim_study::design::DesignSpec;
 use zsim_study::reproduction::ExperimentSpec;
-use zsim_study::spring::design::DesignSpec;
 use zsim_study::sweep::SweepSpec;
 use zsim_world::SceneSpec;
 

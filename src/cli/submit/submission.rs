@@ -4,7 +4,7 @@ use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use zsim_base::files;
-use zsim_study::replace_text;
+use zsim_base::files::replace_text;
 use zsim_study::sweep::Sweep;
 
 /// Memory above the limit of a run, MiB: for the process that supervises the runs.

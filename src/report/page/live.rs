@@ -2,8 +2,9 @@
 
 use super::data::View;
 use super::update::Volume;
-use super::{MAX_PAGE_POINTS, MAX_PAGE_POSES, encode, html, scripts, stage};
+use super::{MAX_PAGE_POINTS, MAX_PAGE_POSES, encode, html, links, scripts, stage, static_surfaces};
 use serde_json::json;
+use zsim_simulation::Simulation;
 
 const SECTIONS: &str = include_str!("assets/live.html");
 const EVENTS: &str = "<section id=\"events\"><h2>Events</h2>\n<ul id=\"event-list\"></ul></section>\n";
@@ -23,6 +24,19 @@ impl LivePage {
     /// The page of an estimate from a recording: nothing else is known before.
     pub fn of_recording(title: &str) -> Self {
         Self { title: title.to_owned(), view: View::default(), volume: Volume::default() }
+    }
+
+    /// Creates the page of a full run of `simulation`: the true surfaces, the head and its springs are known before.
+    pub fn of_simulation(simulation: &Simulation) -> Self {
+        let (world, head) = (simulation.world(), &simulation.inputs().head.spec);
+        let (surfaces, surfaces_are_partial) = static_surfaces(world);
+        let (lower, upper) = world.bounds();
+        let (links, parts) = (links::of(&head.linkage), links::blocks(&head.parts));
+        Self {
+            title: world.name().to_owned(),
+            view: View { surfaces, surfaces_are_partial, links, parts, ..View::default() },
+            volume: Volume::around(lower, upper),
+        }
     }
 
     /// The HTML of the page.

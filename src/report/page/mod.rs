@@ -12,6 +12,7 @@ mod data;
 mod encode;
 mod gains;
 mod html;
+pub mod links;
 mod live;
 mod paper;
 mod points;
@@ -21,6 +22,7 @@ mod scripts;
 mod spring;
 mod stage;
 mod study;
+mod surfaces;
 mod table;
 mod update;
 
@@ -48,6 +50,8 @@ pub use points::{PointColumn, RunPoints};
 pub use scene::{MaterialRow, ScenePage};
 pub use spring::{NotedTable, SpringPage};
 pub use study::{MAX_PAGE_RUNS, StudyPage};
+pub use surfaces::static_surfaces;
+pub(crate) use surfaces::{Triangle, area_m2, largest};
 pub use table::PageTable;
 pub use update::{Increment, LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TruePoses, Volume};
 

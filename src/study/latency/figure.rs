@@ -1,8 +1,9 @@
 //! Figures: sections through the map as in the paper's figure 4, and error curves.
 
-use super::{ClockState, Disturbance, LatencyResult, LatencyRun};
+use super::{LatencyResult, LatencyRun};
 use crate::sweep::ConfidenceInterval;
 use zsim_report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, SignedDot, SignedDots};
+use zsim_run::timing::{ClockState, Disturbance};
 
 /// Angular rate at the ends of the colour scale, degrees/s; larger rates saturate the colour.
 const FULL_COLOUR_DEG_PER_S: f64 = 150.0;

@@ -1,8 +1,9 @@
 //! Tables of a latency study.
 
-use super::{ClockState, Disturbance, LatencyResult, LatencyRun};
+use super::{LatencyResult, LatencyRun};
 use crate::sweep::ConfidenceInterval;
 use std::fmt::Write;
+use zsim_run::timing::{ClockState, Disturbance};
 
 /// CSV with one row per run: `latency_ms,noise_ms,clock_state` and the measures with their confidence limits.
 pub fn csv(study: &LatencyResult) -> String {

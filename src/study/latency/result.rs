@@ -1,8 +1,9 @@
 //! Result of a latency study.
 
-use super::{ClockState, Disturbance, MapErrors, Section};
-use crate::sweep::{Block, ConfidenceInterval, Journey, Resampling, pooled};
+use crate::sweep::{ConfidenceInterval, Resampling};
 use serde::Serialize;
+use zsim_run::RunInputs;
+use zsim_run::timing::{Block, ClockState, Disturbance, MapErrors, Section, pooled};
 
 /// Result of one run with its confidence intervals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -71,11 +72,11 @@ pub struct LatencyResult {
 
 impl LatencyResult {
     /// Summarises the runs of a sweep, in its order; `None` without runs, or if two have the same timing.
-    pub(crate) fn of(runs: &[(Journey, MapErrors)]) -> Option<Self> {
+    pub(crate) fn of(runs: &[(RunInputs, MapErrors)]) -> Option<Self> {
         let (first, errors) = runs.first()?;
         let (inputs, timing) = (&first.simulation, first.timing?);
         let resampling = Resampling::new(errors.blocks.len(), inputs.seed);
-        let run = |(journey, errors): &(Journey, MapErrors)| {
+        let run = |(journey, errors): &(RunInputs, MapErrors)| {
             Some(LatencyRun {
                 disturbance: journey.timing?.disturbance(),
                 clock: ClockState::of(&journey.estimator.spec),
@@ -139,7 +140,7 @@ impl LatencyResult {
 }
 
 /// Latency of minimal error with the clock state off.
-fn minimum(summaries: &[LatencyRun], runs: &[(Journey, MapErrors)], resampling: &Resampling) -> Minimum {
+fn minimum(summaries: &[LatencyRun], runs: &[(RunInputs, MapErrors)], resampling: &Resampling) -> Minimum {
     let is_curve = |run: &LatencyRun| run.clock == ClockState::Off && run.disturbance.noise_ms == 0.0;
     let curve: Vec<(f64, &[Block])> = summaries
         .iter()

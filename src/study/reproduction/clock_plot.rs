@@ -1,8 +1,9 @@
 //! Plot of the clock offsets of the runs of a study over time.
 
 use crate::StudyError;
-use crate::sweep::{AxisSpec, ClockCurve, Sweep};
+use crate::sweep::{AxisSpec, Sweep};
 use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
+use zsim_run::ClockCurve;
 
 /// Colours of the levels; further levels repeat them.
 const COLOURS: [Colour; 5] = [Colour::Estimate, Colour::Second, Colour::Third, Colour::Fourth, Colour::Fifth];

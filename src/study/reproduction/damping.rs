@@ -3,11 +3,11 @@
 use super::PeaksSpec;
 use crate::StudyError;
 use crate::cma_es::CmaEs;
-use crate::gains::{AXES, with_damping};
 use serde::{Deserialize, Serialize};
 use zsim_base::random::Seed;
 use zsim_base::spec::Source;
 use zsim_dynamics::{AccelerationKind, DampingSpec, HeadModel, HeadSpec, Peak};
+use zsim_head::gains::{AXES, with_damping};
 use zsim_motion::Axis;
 
 /// Budget of the fit: evaluations of the closed form's peaks, 120 generations.

@@ -2,10 +2,10 @@
 
 use super::{ExperimentResult, ExperimentSpec, Extent, RunsSpec, gain_curves, runs, timing};
 use crate::StudyError;
-use crate::atomic_file::write_text;
 use crate::sweep::{ContentHash, MergedReport, Plan, Runner, Shard, Sweep, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use zsim_base::files::write_text;
 use zsim_base::spec::{Kind, Source, find, names, parse, to_text};
 
 /// File with the result, which is written last.

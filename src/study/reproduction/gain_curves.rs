@@ -6,14 +6,15 @@ use super::{
     gain_plots,
 };
 use crate::StudyError;
-use crate::atomic_file::write_text;
-use crate::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
 use crate::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
 use std::path::Path;
+use zsim_base::files::FileError;
 use zsim_base::files::subfolder;
+use zsim_base::files::write_text;
 use zsim_base::spec::{self, Named, Source};
 use zsim_dynamics::{DampingSpec, HeadSpec, Peak};
+use zsim_head::gains::{AXES, GainCurve, GainPlan, GainsSpec, csv, with_damping};
 use zsim_motion::Axis;
 
 /// Fits the damping of the heads, measures their gains, draws figures, and compares with the paper.
@@ -44,7 +45,7 @@ pub(super) fn run(
         .map(|((design, fit), curves)| HeadResponse { design, fit, curves: curves.to_vec() })
         .collect();
     for (response, head) in responses.iter().zip(&damped) {
-        let folder = subfolder(folder, &response.design.letter).map_err(StudyError::file(folder))?;
+        let folder = subfolder(folder, &response.design.letter).map_err(FileError::at(folder))?;
         write_text(&folder, &folder.join("gains.csv"), &csv(&response.curves))?;
         write_text(&folder, &folder.join("head.ron"), &(spec::to_text(head)? + "\n"))?;
     }

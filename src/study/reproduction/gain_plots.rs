@@ -1,7 +1,7 @@
 //! Plots of figure 3: one column per design with the paper's three panels.
 
 use super::head_response::HeadResponse;
-use crate::gains::{GainCurve, coherence_panels, gain_panels};
+use zsim_head::gains::{GainCurve, coherence_panels, gain_panels};
 use zsim_report::plot::{Chart, Figure};
 
 /// Gain curves: simulation as dots, closed form as lines.

@@ -2,7 +2,7 @@
 
 use super::damping::DampingFit;
 use super::spec::DesignedSpec;
-use crate::gains::GainCurve;
+use zsim_head::gains::GainCurve;
 
 /// A head with fitted damping and its gain curves.
 pub(super) struct HeadResponse<'a> {

@@ -3,6 +3,7 @@
 use super::{ComparedNumber, Comparison, Extent, Finding, Verdict};
 use crate::StudyError;
 use std::path::Path;
+use zsim_base::files::FileError;
 use zsim_report::page::{ExperimentSection, PageLink, PagePlot, PageTable, PaperPage};
 
 /// The page of all experiments as HTML; `folder` has the folder of each, and the page belongs in it.
@@ -51,7 +52,7 @@ fn section(finding: &Finding, folder: &Path, options: &str) -> Result<Experiment
     for (name, title) in experiment.plots() {
         let path = own.join(format!("{name}.svg"));
         if path.is_file() {
-            let svg = std::fs::read_to_string(&path).map_err(StudyError::file(&path))?;
+            let svg = std::fs::read_to_string(&path).map_err(FileError::at(&path))?;
             plots.push(PagePlot { name: (*title).to_owned(), svg });
         }
     }

@@ -4,9 +4,9 @@ use super::comparison::{rounded, with_unit};
 use super::spec::{ClaimSpec, ResultSpec, RunsSpec, WarningSpec};
 use super::{ComparedNumber, Comparison, ExperimentResult, clock_plot};
 use crate::StudyError;
-use crate::integrity::large_error_m;
 use crate::sweep::{Measure, Sweep};
 use std::path::Path;
+use zsim_run::large_error_m;
 
 /// Draws the figure of an experiment that has one in `folder`.
 pub(super) fn plot(spec: &RunsSpec, sweep: &Sweep, folder: &Path) -> Result<(), StudyError> {

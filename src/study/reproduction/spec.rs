@@ -1,12 +1,12 @@
 //! Spec of an experiment: `specs/experiments/NAME.ron`.
 
 use super::Extent;
-use crate::gains::AXES;
 use crate::sweep::{AxisSpec, BaseSpec, JourneySpec, Measure, Setting, SweepSpec};
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find_from, parse_named};
 use zsim_dynamics::HeadSpec;
+use zsim_head::gains::AXES;
 use zsim_motion::Axis;
 
 /// An experiment of the paper.

@@ -2,8 +2,9 @@
 
 use super::{ComparedNumber, Comparison, ExperimentResult};
 use crate::StudyError;
-use crate::latency::{ClockState, Disturbance, LatencyResult, conclusions, curve_figure, map_figure};
+use crate::latency::{LatencyResult, conclusions, curve_figure, map_figure};
 use std::path::Path;
+use zsim_run::timing::{ClockState, Disturbance};
 
 /// What the paper shows of a map with latency.
 const MISALIGNED: &str = "visible misalignment";

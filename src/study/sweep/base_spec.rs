@@ -1,10 +1,10 @@
 //! The run that a sweep varies.
 
-use crate::gains::GainsSpec;
-use crate::latency::TimingSpec;
-use crate::spring::Shake;
 use serde::{Deserialize, Serialize};
 use zsim_base::spec::checked;
+use zsim_head::gains::GainsSpec;
+use zsim_head::spring::Shake;
+use zsim_run::timing::TimingSpec;
 use zsim_simulation::Scenario;
 
 /// The base run. Each spec is a path or a name in the library.

@@ -4,61 +4,12 @@ use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use zsim_base::random::Seed;
+use zsim_run::timing::{Block, pooled};
 
 /// Number of bootstrap resamples: the ends of a 95 % interval then rest on 50 resamples each.
 const RESAMPLES: usize = 2000;
 /// Confidence level of the intervals.
 const CONFIDENCE_LEVEL: f64 = 0.95;
-
-/// Error sums over one block of time; sums of several blocks are added.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Block {
-    /// Number of cloud points within reach of a surface.
-    pub points: f64,
-    /// Sum of the signed distances of the points to the surfaces, m.
-    pub distance_m: f64,
-    /// Sum of the squared distances, m^2.
-    pub distance2_m2: f64,
-    /// Number of poses.
-    pub poses: f64,
-    /// Sum of the squared position errors of the poses, m^2.
-    pub position2_m2: f64,
-}
-
-impl Block {
-    fn add(&mut self, other: &Block, times: f64) {
-        self.points += times * other.points;
-        self.distance_m += times * other.distance_m;
-        self.distance2_m2 += times * other.distance2_m2;
-        self.poses += times * other.poses;
-        self.position2_m2 += times * other.position2_m2;
-    }
-
-    /// Variance of the signed distances, m^2.
-    pub fn cloud_variance_m2(&self) -> f64 {
-        let mean = self.distance_m / self.points;
-        (self.distance2_m2 / self.points - mean * mean).max(0.0)
-    }
-
-    /// Mean of the squared position error, m^2.
-    pub fn position_variance_m2(&self) -> f64 {
-        self.position2_m2 / self.poses
-    }
-
-    /// Mean signed distance, m.
-    pub fn cloud_bias_m(&self) -> f64 {
-        self.distance_m / self.points
-    }
-}
-
-/// Sum of all blocks.
-pub(crate) fn pooled(blocks: &[Block]) -> Block {
-    blocks.iter().fold(Block::default(), |mut sum, block| {
-        sum.add(block, 1.0);
-        sum
-    })
-}
 
 /// A value with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

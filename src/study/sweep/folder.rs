@@ -13,13 +13,14 @@ use super::table::{Column, ColumnType, TableWriter, open, read_columns};
 use super::tree::Tree;
 use super::{BaseSpec, Plan, SweepSpec};
 use crate::StudyError;
-use crate::atomic_file::write_text;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use zsim_base::files;
+use zsim_base::files::FileError;
+use zsim_base::files::write_text;
 use zsim_base::spec::{self, Source, SpecError, to_text};
 
 /// Number of runs that are hashed in parallel and written together to the table of runs.
@@ -75,17 +76,17 @@ impl Plan {
         if !anew && !plan_path(folder).exists() && is_foreign(folder)? {
             return Err(StudyError::FolderMismatch { folder: folder.to_owned() });
         }
-        let create = |name: &str| files::subfolder(folder, name).map_err(StudyError::file(folder));
+        let create = |name: &str| files::subfolder(folder, name).map_err(FileError::at(folder));
         let (temporary, _) = (create(TEMPORARY)?, create(PARTS)?);
         let plan = plan_path(folder);
         let written = temporary.join("points.csv");
         let identity = self.write_points(&temporary, &written)?;
         let text = self.text_with(&identity.to_string())?;
         let points = points_path(folder);
-        let read = |path: &Path| files::open(path).and_then(std::io::read_to_string).map_err(StudyError::file(path));
+        let read = |path: &Path| files::open(path).and_then(std::io::read_to_string).map_err(FileError::at(path));
         if plan.exists() && read(&plan)? == text {
             // The same content, unless the file is damaged or of a version with another format.
-            std::fs::rename(&written, &points).map_err(StudyError::file(&points))?;
+            std::fs::rename(&written, &points).map_err(FileError::at(&points))?;
             return Sweep::open(folder);
         }
         if plan.exists() && !anew {
@@ -93,9 +94,9 @@ impl Plan {
         }
         // Write the plan last: its presence implies a complete table of runs.
         if plan.exists() {
-            std::fs::remove_file(&plan).map_err(StudyError::file(&plan))?;
+            std::fs::remove_file(&plan).map_err(FileError::at(&plan))?;
         }
-        std::fs::rename(&written, &points).map_err(StudyError::file(&points))?;
+        std::fs::rename(&written, &points).map_err(FileError::at(&points))?;
         write_text(&temporary, &plan, &text)?;
         Sweep::open(folder)
     }
@@ -200,7 +201,7 @@ impl Sweep {
             return Err(SpecError::plain(folder.display().to_string(), message).into());
         }
         for name in [TEMPORARY, PARTS] {
-            files::check_subfolder(folder, Path::new(name)).map_err(StudyError::file(folder))?;
+            files::check_subfolder(folder, Path::new(name)).map_err(FileError::at(folder))?;
         }
         let source = Source::read(&path)?;
         let file: PlanFile = spec::parse(&source)?;
@@ -275,11 +276,11 @@ fn is_foreign(folder: &Path) -> Result<bool, StudyError> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(false),
-        Err(error) => return Err(StudyError::file(folder)(error)),
+        Err(error) => return Err(FileError::at(folder)(error).into()),
     };
     let ours = [temporary_folder(folder), parts_folder(folder), points_path(folder)];
     for entry in entries {
-        if !ours.contains(&entry.map_err(StudyError::file(folder))?.path()) {
+        if !ours.contains(&entry.map_err(FileError::at(folder))?.path()) {
             return Ok(true);
         }
     }

@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::path::Path;
+use zsim_base::files::FileError;
 
 /// First 128 bits of a SHA-256: collisions are negligible for any feasible number of runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -127,7 +128,7 @@ fn file_hash(path: &Path) -> Result<Option<ContentHash>, StudyError> {
     if !path.is_file() {
         return Ok(None);
     }
-    let bytes = std::fs::read(path).map_err(StudyError::file(path))?;
+    let bytes = std::fs::read(path).map_err(FileError::at(path))?;
     Ok(Some(ContentHash::of([bytes.as_slice()])))
 }
 

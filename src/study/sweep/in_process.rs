@@ -1,15 +1,15 @@
 //! Runs that are evaluated in this process: closed forms, and gains of a head.
 
 use super::part::RunOutcome;
-use super::results::Results;
 use super::tree::{ClosedForm, GainRun};
 use super::{BaseSpec, Measure, Plan};
 use crate::StudyError;
-use crate::gains::{GainWatch, gain_curve};
-use crate::spring::{MISSION_HOURS, closed_form};
 use std::time::Instant;
 use zsim_base::spec;
 use zsim_dynamics::HeadModel;
+use zsim_head::gains::{GainWatch, gain_curve};
+use zsim_head::spring::{MISSION_HOURS, closed_form};
+use zsim_run::Results;
 
 /// Evaluates run `index`. A failure, such as a head without static equilibrium, is recorded as an error.
 pub(super) fn evaluate(plan: &Plan, measures: &[Measure], index: u64) -> RunOutcome {
@@ -26,7 +26,10 @@ fn metrics(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, 
     let inputs = plan.inputs(index)?.closed_form();
     let ClosedForm { shake, head } = inputs.map_err(|message| StudyError::Plan { what: "run", message })?;
     let head = Some(closed_form(&head.spec, &head.source(), &shake, MISSION_HOURS)?);
-    Ok(RunOutcome { figures: Results { head, ..Results::default() }.figures(measures), ..RunOutcome::default() })
+    Ok(RunOutcome {
+        figures: super::figures(&Results { head, ..Results::default() }, measures),
+        ..RunOutcome::default()
+    })
 }
 
 /// Measures a gain curve, which is the detail of the run.
@@ -36,6 +39,6 @@ fn gains(plan: &Plan, measures: &[Measure], index: u64) -> Result<RunOutcome, St
     let head = HeadModel::new(&head.spec, &head.source())?;
     let curve = gain_curve(&head, gains.axis, &gains.plan(), GainWatch::silent())?;
     let peak_gain = curve.peak.map(|peak| peak.gain);
-    let figures = Results { peak_gain, ..Results::default() }.figures(measures);
+    let figures = super::figures(&Results { peak_gain, ..Results::default() }, measures);
     Ok(RunOutcome { figures, details: Some(spec::to_text(&curve)?), ..RunOutcome::default() })
 }

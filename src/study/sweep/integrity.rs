@@ -3,8 +3,8 @@
 use super::table::{Column, ColumnType};
 use super::{Measure, Plan, Sweep};
 use crate::StudyError;
-use crate::integrity::large_error_m;
 use zsim_report::page::PageTable;
+use zsim_run::large_error_m;
 
 /// Name of the axis of fault lists, and its level without faults.
 const FAULT_AXIS: (&str, &str) = ("faults", "none");

@@ -5,10 +5,10 @@ use super::part::Part;
 use super::table::{Column, ColumnType, TableWriter, open, read_columns};
 use super::{Measure, Shard, Sweep};
 use crate::StudyError;
-use crate::atomic_file::write_text;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use zsim_base::files::write_text;
 use zsim_base::spec::{SpecError, split_unit};
 
 /// Progress of a sweep.

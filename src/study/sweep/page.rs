@@ -6,6 +6,7 @@ use super::plots::PlotFile;
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
 use crate::StudyError;
+use zsim_base::files::FileError;
 use zsim_report::page::{MAX_PAGE_RUNS, PagePlot, PageTable, PointColumn, RunPoints, StudyPage};
 use zsim_report::{axis_label, quantity_name};
 
@@ -62,7 +63,7 @@ impl Sweep {
         let (mut shown, mut bytes) = (Vec::new(), 0);
         for PlotFile { name, title } in plots {
             let path = self.folder.join("plots").join(format!("{name}.svg"));
-            let svg = std::fs::read_to_string(&path).map_err(StudyError::file(&path))?;
+            let svg = std::fs::read_to_string(&path).map_err(FileError::at(&path))?;
             bytes += svg.len();
             if bytes <= MAX_PLOTS_BYTES {
                 shown.push(PagePlot { name: title.clone(), svg });

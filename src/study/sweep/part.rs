@@ -5,10 +5,11 @@ use super::identity::ContentHash;
 use super::table::{Column, ColumnType, open, read_columns, to_csv};
 use super::{Measure, Sweep};
 use crate::StudyError;
-use crate::atomic_file::write_bytes;
 use serde::de::DeserializeOwned;
 use std::error::Error;
 use std::io::{Read, Seek, SeekFrom};
+use zsim_base::files::FileError;
+use zsim_base::files::write_bytes;
 use zsim_base::spec::{self, Source};
 
 /// Length of a checksum in the first line of a part file.
@@ -45,7 +46,7 @@ pub(super) struct RunOutcome {
 
 impl RunOutcome {
     /// Outcome of a run that failed with `error`; the message includes its causes.
-    pub fn from_error(measures: usize, error: &StudyError) -> Self {
+    pub fn from_error(measures: usize, error: &dyn Error) -> Self {
         let mut messages = vec![error.to_string()];
         let mut cause = error.source();
         while let Some(error) = cause {
@@ -85,8 +86,8 @@ impl Sweep {
         columns.extend((0..times).map(|k| Column::Numbers(rows.iter().map(|row| cell(&row.times, k)).collect())));
         columns.push(Column::Text(rows.iter().map(|row| row.details.clone()).collect()));
         let path = self.part_path(unit);
-        let bytes = part_bytes(unit, &self.part_columns(), &columns).map_err(StudyError::file(&path))?;
-        write_bytes(&self.temporary(), &path, &bytes)
+        let bytes = part_bytes(unit, &self.part_columns(), &columns).map_err(FileError::at(&path))?;
+        Ok(write_bytes(&self.temporary(), &path, &bytes)?)
     }
 
     /// Reads a unit's part file.

@@ -4,12 +4,13 @@ use super::axis::{Axis, Level, SpecSet};
 use super::check::{MAX_RUNS, check};
 use super::design::{AxisSize, Design};
 use super::identity::{ContentHash, InputHashes, input_hashes, is_after_recording};
-use super::tree::{GainRun, Journey, Tree};
+use super::tree::{GainRun, Tree};
 use super::{BaseSpec, JourneySpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::StudyError;
-use crate::gains::GainsSpec;
 use zsim_base::spec::{Named, Source, SpecError, to_json};
 use zsim_dynamics::HeadSpec;
+use zsim_head::gains::GainsSpec;
+use zsim_run::RunInputs;
 use zsim_simulation::Simulation;
 
 /// A sweep with resolved specs; [`Plan::write`] stores it in a folder.
@@ -27,7 +28,7 @@ pub struct Plan {
 /// A journey of a sweep with its hashes.
 #[derive(Debug, Clone)]
 pub(super) struct PlannedJourney {
-    pub inputs: Journey,
+    pub inputs: RunInputs,
     /// Hash of the recording: equal for runs with the same recording.
     pub recording: ContentHash,
     /// Hash of physics and rays: equal for runs with the same physics and rays.

@@ -6,8 +6,9 @@ use super::runs::Runs;
 use super::summary::{LevelSummary, Summary};
 use super::{Measure, Sweep};
 use crate::StudyError;
-use crate::atomic_file::write_text;
+use zsim_base::files::FileError;
 use zsim_base::files::subfolder;
+use zsim_base::files::write_text;
 use zsim_report::plot::{Chart, Colour, Figure, Mark, Series, Tick, robust_range};
 use zsim_report::quantity_name;
 
@@ -40,7 +41,7 @@ impl Sweep {
     /// # Errors
     /// If the table is not merged, or if a file cannot be written.
     pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<PlotFile>, StudyError> {
-        let folder = subfolder(&self.folder, "plots").map_err(StudyError::file(&self.folder))?;
+        let folder = subfolder(&self.folder, "plots").map_err(FileError::at(&self.folder))?;
         let runs = Runs::read(self)?;
         let mut plots = Vec::new();
         let mut save = |name: String, title: String, figure: Figure| {
@@ -119,7 +120,7 @@ impl Sweep {
             text += &(cells.join(",") + "\n");
         }
         let path = self.folder.join("front.csv");
-        write_text(&self.temporary(), &path, &text)
+        Ok(write_text(&self.temporary(), &path, &text)?)
     }
 }
 

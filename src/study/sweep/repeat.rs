@@ -2,12 +2,14 @@
 
 use super::in_process::evaluate;
 use super::{BaseSpec, JourneySpec, Measure, Shard, Sweep};
-use crate::atomic_file::replace_text;
-use crate::result_files::METRICS;
-use crate::{EstimateOptions, EstimateResult, ProgressMonitor, StudyError, simulate_and_estimate};
+use crate::StudyError;
 use std::path::{Path, PathBuf};
+use zsim_base::files::FileError;
+use zsim_base::files::replace_text;
 use zsim_base::files::subfolder;
 use zsim_base::spec;
+use zsim_run::METRICS;
+use zsim_run::{EstimateOptions, EstimateResult, ProgressMonitor, simulate_and_estimate};
 use zsim_simulation::Simulation;
 
 /// Number of digits of a run's hash in the name of its folder.
@@ -35,7 +37,7 @@ impl Sweep {
     /// # Errors
     /// If it cannot be created.
     pub fn create_run_folder(&self, number: u64) -> Result<PathBuf, StudyError> {
-        subfolder(&self.folder, self.run_folder_name(number)).map_err(StudyError::file(&self.folder))
+        Ok(subfolder(&self.folder, self.run_folder_name(number)).map_err(FileError::at(&self.folder))?)
     }
 
     fn run_folder_name(&self, number: u64) -> String {

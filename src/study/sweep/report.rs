@@ -4,8 +4,8 @@ use super::integrity::IntegrityReport;
 use super::output::{csv, markdown, text, trends_csv};
 use super::{Summary, Sweep, SweepStatus};
 use crate::StudyError;
-use crate::atomic_file::write_text;
 use crate::latency::LatencyResult;
+use zsim_base::files::write_text;
 
 /// Report of a merged sweep.
 #[derive(Debug, Clone)]

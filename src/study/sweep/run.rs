@@ -5,9 +5,10 @@ use super::runner::Runner;
 use super::worker::{Worker, WorkerExit};
 use super::{BaseSpec, Sweep};
 use crate::StudyError;
-use crate::progress::PieceProgress;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use zsim_base::parallel::PieceProgress;
+use zsim_base::parallel::Stopped;
 
 /// Shard of a sweep for one of several processes: number `index`, from 0, of `count` equal shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,7 +63,7 @@ impl Sweep {
         let pieces = PieceProgress::new(tasks.len(), runner.on_progress);
         tasks.par_iter().try_for_each(|task| {
             if runner.stop.load(Ordering::Relaxed) {
-                return Err(StudyError::Stopped);
+                return Err(Stopped.into());
             }
             self.tasks[*task].iter().try_for_each(|unit| self.run_block(*unit as usize))?;
             pieces.finish_one();
@@ -98,7 +99,7 @@ impl Sweep {
             });
             let errors: Vec<StudyError> = ended.collect::<Vec<_>>().into_iter().filter_map(Result::err).collect();
             // The first failure stops the other workers: report it rather than their `Stopped`.
-            let is_cause = |error: &StudyError| !matches!(error, StudyError::Stopped);
+            let is_cause = |error: &StudyError| !error.is_stopped();
             let cause = errors.iter().position(is_cause).unwrap_or(0);
             errors.into_iter().nth(cause).map_or(Ok(()), Err)
         })

@@ -1,8 +1,8 @@
 //! Execution options of a sweep.
 
-use crate::progress::OnProgress;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+use zsim_base::parallel::OnProgress;
 
 /// Execution options of a sweep.
 #[derive(Clone, Copy)]

@@ -1,10 +1,11 @@
 //! A suite of recordings for other systems: those of the journeys of a plan.
 
 use super::{BaseSpec, Plan, Setting};
-use crate::record::record_with_truth_apart;
-use crate::{ProgressMonitor, StudyError};
+use crate::StudyError;
 use std::collections::BTreeSet;
 use std::path::Path;
+use zsim_run::ProgressMonitor;
+use zsim_run::record_with_truth_apart;
 use zsim_simulation::Simulation;
 
 /// A recording of a suite.
@@ -64,7 +65,7 @@ impl Plan {
         watch: &mut ProgressMonitor,
     ) -> Result<(), StudyError> {
         let journey = self.journey(recording.run, &self.inputs(recording.run)?)?.inputs;
-        record_with_truth_apart(&Simulation::build(journey.simulation)?, file, truth, watch)
+        Ok(record_with_truth_apart(&Simulation::build(journey.simulation)?, file, truth, watch)?)
     }
 }
 

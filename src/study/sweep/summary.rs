@@ -1,6 +1,5 @@
 //! Summary of a sweep: statistics of each measure per axis and level.
 
-use super::measure::Needs;
 use super::paired::{holm, signed_rank_p};
 use super::runs::{Runs, level_count, level_label};
 use super::table::{Column, ColumnType};
@@ -8,6 +7,7 @@ use super::trend::rank_correlation;
 use super::{Measure, Plan, Sampling, Sweep};
 use crate::StudyError;
 use serde::Serialize;
+use zsim_run::Needs;
 
 /// Significance level of corrected p-values, for differences between levels and for trends.
 pub const SIGNIFICANCE_LEVEL: f64 = 0.05;

@@ -1,12 +1,13 @@
 //! Tables as CSV (RFC 4180), written atomically and read a row at a time.
 
 use crate::StudyError;
-use crate::atomic_file::AtomicFile;
 use csv::{Reader, StringRecord, Writer};
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use zsim_base::files;
+use zsim_base::files::AtomicFile;
+use zsim_base::files::FileError;
 
 /// Type of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,20 +100,20 @@ impl TableWriter {
         let writer = Writer::from_writer(AtomicFile::new(folder, target)?);
         let mut table = Self { writer, target: target.to_owned() };
         let written = write_header(&mut table.writer, columns);
-        written.map_err(|error| StudyError::file(target)(error.into()))?;
+        written.map_err(|error| FileError::at(target)(error.into()))?;
         Ok(table)
     }
 
     /// Appends rows: cells of all columns, of equal length.
     pub fn write(&mut self, columns: &[Column]) -> Result<(), StudyError> {
         let written = write_rows(&mut self.writer, columns);
-        written.map_err(|error| StudyError::file(&self.target)(error.into()))
+        Ok(written.map_err(|error| FileError::at(&self.target)(error.into()))?)
     }
 
     /// Closes the table and moves it to its target.
     pub fn finish(self) -> Result<(), StudyError> {
         let flushed = self.writer.into_inner().map_err(csv::IntoInnerError::into_error);
-        flushed.map_err(StudyError::file(&self.target))?.finish()
+        Ok(flushed.map_err(FileError::at(&self.target))?.finish()?)
     }
 }
 
@@ -138,7 +139,7 @@ pub(super) fn open(path: &Path) -> Result<Option<File>, StudyError> {
     match files::open(path) {
         Ok(file) => Ok(Some(file)),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(StudyError::file(path)(error)),
+        Err(error) => Err(FileError::at(path)(error).into()),
     }
 }
 

@@ -3,11 +3,13 @@
 use super::identity::ContentHash;
 use super::part::RunOutcome;
 use super::plan::PlannedJourney;
-use super::simulated_run::{MAX_RECORDINGS, TemporaryRecording, record_simulations};
-use super::{LimitSpec, Sweep};
+use super::{LimitSpec, Sweep, figures, needs};
 use crate::StudyError;
-use crate::threads::for_each_on_threads;
 use std::collections::BTreeMap;
+use std::error::Error;
+use std::time::Instant;
+use zsim_base::parallel::for_each_on_threads;
+use zsim_run::{MAX_RECORDINGS, RunError, RunInputs, TemporaryRecording, record_simulations};
 use zsim_simulation::Simulation;
 
 /// Message from a worker to its supervisor, one line on stdout: `begin 7`, `done 7`.
@@ -126,7 +128,7 @@ impl Sweep {
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {
             let Some((_, run)) = each.runs.first() else { continue };
-            match Simulation::build(run.inputs.simulation.clone()).map_err(StudyError::from) {
+            match Simulation::build(run.inputs.simulation.clone()) {
                 Ok(simulation) => {
                     simulations.push(simulation);
                     groups.push(each);
@@ -135,9 +137,9 @@ impl Sweep {
                 Err(error) => self.fail(each, &error, report)?,
             }
         }
-        let recordings = match record_simulations(simulations, recorded, threads, limit) {
+        let recordings = match record_simulations(simulations, recorded, threads, limit.time_s) {
             Ok(recordings) => recordings,
-            Err(error @ StudyError::File { .. }) => return Err(error),
+            Err(error @ RunError::File(_)) => return Err(error.into()),
             Err(error) => return groups.into_iter().try_for_each(|each| self.fail(each, &error, report)),
         };
         let runs: Vec<(&TemporaryRecording, &(usize, PlannedJourney))> = recordings
@@ -160,7 +162,7 @@ impl Sweep {
             let (recording, (unit, run)) = runs[index];
             if !self.is_done(&self.units[*unit])? {
                 report(WorkerMessage::Begin(*unit));
-                let outcome = recording.evaluate(&self.plan, limit, &run.inputs, reader);
+                let outcome = self.evaluate(recording, limit.time_s, &run.inputs, reader);
                 self.write_part(&self.units[*unit], &[outcome])?;
             }
             report(WorkerMessage::Done(*unit));
@@ -168,11 +170,30 @@ impl Sweep {
         })
     }
 
+    /// Evaluates a run on its recording, read by thread `reader`.
+    fn evaluate(&self, recording: &TemporaryRecording, limit_s: f64, run: &RunInputs, reader: usize) -> RunOutcome {
+        let (measures, times) = (self.plan.result_measures(), self.plan.time_measures());
+        let needs = needs(&self.plan.spec().measures);
+        let compared = recording.compared_with(limit_s, &needs, run, reader);
+        let started = Instant::now();
+        let results = compared.and_then(|compared| recording.results(&needs, limit_s, run, reader, &compared));
+        let wall_s = Some(started.elapsed().as_secs_f64());
+        match results {
+            Ok((results, details)) => RunOutcome {
+                figures: figures(&results, &measures),
+                times: std::iter::once(wall_s).chain(figures(&results, &times[1..])).collect(),
+                details,
+                error: None,
+            },
+            Err(error) => RunOutcome { times: vec![wall_s], ..RunOutcome::from_error(measures.len(), &error) },
+        }
+    }
+
     /// Records all runs of a group as failed.
     fn fail(
         &self,
         shared: &SharedRecording,
-        error: &StudyError,
+        error: &dyn Error,
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         let outcome = RunOutcome::from_error(self.plan.result_measures().len(), error);

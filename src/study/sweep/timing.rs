@@ -1,23 +1,13 @@
 //! Runs with timing errors: their measures, and the latency study that they make up.
 
-use super::bootstrap::pooled;
-use super::{BaseSpec, Journey, JourneySpec, Sweep};
+use super::{BaseSpec, JourneySpec, Sweep};
 use crate::StudyError;
-use crate::atomic_file::write_text;
-use crate::latency::{ClockState, LatencyResult, MapErrors, csv, curve_figure, map_figure};
+use crate::latency::{LatencyResult, csv, curve_figure, map_figure};
+use zsim_base::files::FileError;
 use zsim_base::files::subfolder;
-use zsim_report::Metrics;
-
-/// The results of a run with timing errors.
-pub(super) fn metrics(errors: &MapErrors) -> Metrics {
-    let sum = pooled(&errors.blocks);
-    let mut metrics = Metrics::default();
-    metrics.open_loop.position_rmse_m = Some(sum.position_variance_m2().sqrt());
-    metrics.cloud.sigma_m = Some(sum.cloud_variance_m2().sqrt());
-    metrics.cloud.bias_m = Some(sum.cloud_bias_m());
-    metrics.clock.offset_end_error_s = Some(errors.clock_error_ms * 1e-3);
-    metrics
-}
+use zsim_base::files::write_text;
+use zsim_run::RunInputs;
+use zsim_run::timing::{ClockState, MapErrors};
 
 impl Sweep {
     /// The latency study of the finished sweep; `None` if its runs have no timing errors, if a run failed or is missing, or
@@ -32,7 +22,7 @@ impl Sweep {
         let Some(errors) = self.details::<MapErrors>()? else { return Ok(None) };
         let inputs =
             self.units.iter().map(|unit| Ok(self.plan.journey(unit.first, &self.plan.inputs(unit.first)?)?.inputs));
-        let inputs: Vec<Journey> = inputs.collect::<Result<_, StudyError>>()?;
+        let inputs: Vec<RunInputs> = inputs.collect::<Result<_, StudyError>>()?;
         Ok(LatencyResult::of(&inputs.into_iter().zip(errors).collect::<Vec<_>>()))
     }
 
@@ -42,7 +32,7 @@ impl Sweep {
         {
             write_text(&self.temporary(), &self.folder.join(name), &text)?;
         }
-        let plots = subfolder(&self.folder, "plots").map_err(StudyError::file(&self.folder))?;
+        let plots = subfolder(&self.folder, "plots").map_err(FileError::at(&self.folder))?;
         map_figure(study, ClockState::Off).save(&plots, "maps")?;
         map_figure(study, ClockState::On).save(&plots, "maps_clock_on")?;
         curve_figure(study).save(&plots, "curves")?;

@@ -1,11 +1,7 @@
 //! The inputs of a run as one tree of settings: an axis of a sweep is a path into it.
 
-use super::reference_inputs::ReferenceInputs;
 use super::{BaseSpec, JourneySpec, ReferenceSpec, settings};
 use crate::StudyError;
-use crate::gains::GainsSpec;
-use crate::latency::TimingSpec;
-use crate::spring::Shake;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -13,44 +9,33 @@ use zsim_base::random::Seed;
 use zsim_base::spec::{self, Named, NamedSpec, Source, SpecError, name_from, to_json};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
 use zsim_estimation::EstimatorSpec;
+use zsim_head::gains::GainsSpec;
+use zsim_head::spring::Shake;
 use zsim_motion::MotionSpec;
+use zsim_run::{ReferenceInputs, RunInputs};
 use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
 use zsim_simulation::{FaultsSpec, Run, Scenario};
 use zsim_world::SceneSpec;
-
-/// Inputs of a journey: the simulation, the estimator, and timing errors between them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Journey {
-    #[serde(flatten)]
-    pub simulation: Run,
-    pub estimator: Named<EstimatorSpec>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub timing: Option<TimingSpec>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) reference: Option<ReferenceInputs>,
-    #[serde(default)]
-    pub ignore_manifest: bool,
-}
-
-impl Journey {
-    /// A simulation with an estimator, without timing errors.
-    pub(crate) fn new(simulation: Run, estimator: Named<EstimatorSpec>) -> Self {
-        Self { simulation, estimator, timing: None, reference: None, ignore_manifest: false }
-    }
-}
 
 impl JourneySpec {
     /// Loads the specs, whose names are relative to `source`; the seed is 0.
     ///
     /// # Errors
     /// If a spec is missing or invalid.
-    pub(super) fn load(&self, source: &Source) -> Result<Journey, StudyError> {
+    pub(super) fn load(&self, source: &Source) -> Result<RunInputs, StudyError> {
         let Self { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, .. } = self.clone();
         let seed = Seed(0);
         let scenario = Scenario { scene, head, motion, lidar, imu, clock, base_imu, faults, route, duration_s, seed };
         let simulation = Run::load(&scenario.relative_to(source))?;
-        let of_reference = |spec: &ReferenceSpec| ReferenceInputs::load(spec, source);
-        Ok(Journey {
+        let of_reference = |ReferenceSpec { head, motion, lidar }: &ReferenceSpec| {
+            let (head, motion) = (name_from(source, head), name_from(source, motion));
+            Ok::<_, StudyError>(ReferenceInputs {
+                head: Named::load(&head)?,
+                motion: Named::load(&motion)?,
+                lidar: Named::load(&name_from(source, lidar))?,
+            })
+        };
+        Ok(RunInputs {
             simulation,
             estimator: Named::load(&name_from(source, &self.estimator))?,
             timing: self.timing,
@@ -166,10 +151,10 @@ impl Tree {
     ///
     /// # Errors
     /// A message if a value is invalid.
-    pub fn journey(&self, seed: u64) -> Result<Journey, String> {
+    pub fn journey(&self, seed: u64) -> Result<RunInputs, String> {
         let mut inputs = self.0.clone();
         inputs.insert(SEED.to_owned(), seed.into());
-        let journey: Journey = read(inputs)?;
+        let journey: RunInputs = read(inputs)?;
         journey.estimator.spec.check().map_err(|error| error.to_string())?;
         journey.timing.map_or(Ok(()), |timing| timing.check(journey.simulation.duration_s))?;
         Ok(journey)

@@ -4,7 +4,6 @@ use super::Sweep;
 use super::runner::Runner;
 use super::task::WorkerMessage;
 use crate::StudyError;
-use crate::progress::PieceProgress;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -12,6 +11,9 @@ use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
+use zsim_base::files::FileError;
+use zsim_base::parallel::PieceProgress;
+use zsim_base::parallel::Stopped;
 
 /// Interval at which the stop flag and the time limit are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -46,7 +48,7 @@ pub(super) enum WorkerExit {
 impl Worker<'_> {
     /// Starts a worker process with `threads` threads and waits for its end.
     pub fn attempt(&self, threads: usize) -> Result<WorkerExit, StudyError> {
-        let failed = |error: std::io::Error| StudyError::file(self.runner.program)(error);
+        let failed = |error: std::io::Error| FileError::at(self.runner.program)(error);
         let mut stderr = tempfile::tempfile().map_err(failed)?;
         let mut child = Command::new(self.runner.program)
             .args(["sweep", "task", "--quiet", "--threads", &threads.to_string(), "--task", &self.task.to_string()])
@@ -74,7 +76,7 @@ impl Worker<'_> {
         });
         let status = child.wait().map_err(failed)?;
         if self.is_stopped() {
-            return Err(StudyError::Stopped);
+            return Err(Stopped.into());
         }
         if status.success() {
             return Ok(WorkerExit::Done);
@@ -130,7 +132,7 @@ impl Worker<'_> {
         if let Some(signal) = signal_of(status) {
             // SIGHUP, SIGINT and SIGTERM come from a terminal or a scheduler: stop the sweep.
             let from_outside = [1, 2, 15].contains(&signal);
-            return if from_outside { Err(StudyError::Stopped) } else { Ok(format!("killed by signal {signal}")) };
+            return if from_outside { Err(Stopped.into()) } else { Ok(format!("killed by signal {signal}")) };
         }
         if status.code() == Some(101) {
             let message = stderr.lines().find(|line| !line.trim().is_empty() && !line.contains("panicked at"));

@@ -2,17 +2,15 @@
 
 mod table;
 
-use super::results::Results;
 use super::{BaseSpec, JourneySpec};
-use crate::spring::DesignMetrics;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Deserializer, EnumAccess, Error, VariantAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
 use std::fmt;
 use table::{Entry, KEYS, TABLE, Unit};
-
-pub(super) use table::Needs;
+use zsim_head::spring::DesignMetrics;
+use zsim_run::{Needs, Results};
 
 /// A measure of a run: a figure of its results, by its position in the table of measures.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,6 +62,16 @@ impl Measure {
         (self.entry().of)(results).filter(|figure| figure.is_finite())
     }
 
+    /// The figure in the closed form of a head; `None` if it is not known, or has no closed form.
+    pub fn of_head(self, head: &DesignMetrics) -> Option<f64> {
+        self.of(&Results { head: Some(*head), ..Results::default() })
+    }
+
+    /// The figure of the closed form for goals and limits: infinite if it is not known.
+    pub(crate) fn cost_of_head(self, head: &DesignMetrics) -> f64 {
+        self.of_head(head).unwrap_or(f64::INFINITY)
+    }
+
     /// Key in files.
     pub fn key(self) -> &'static str {
         self.entry().key
@@ -98,22 +106,17 @@ impl Measure {
 
     /// Whether it is a computing time, which differs from run to run.
     pub(super) fn is_time(self) -> bool {
-        matches!(self.needs(), Needs::OpenLoopTime | Needs::ClosedLoopTime | Needs::WallClock)
-    }
-
-    /// Whether runs with this measure close loops.
-    pub(super) fn needs_closed_loop(self) -> bool {
-        matches!(self.needs(), Needs::ClosedLoop | Needs::SlamBound | Needs::ClosedLoopTime)
+        self.needs().is_time()
     }
 
     /// Whether a head on its spring has this measure in closed form.
     pub(crate) fn has_closed_form(self) -> bool {
-        matches!(self.needs(), Needs::Head | Needs::SwingOrHead)
+        self.needs().has_closed_form()
     }
 
     /// Whether it is a figure of an estimate from a recording.
     pub(crate) fn is_of_estimate(self) -> bool {
-        !matches!(self.needs(), Needs::Head | Needs::Swing | Needs::SwingOrHead | Needs::WallClock)
+        self.needs().is_of_estimate()
     }
 
     /// Whether it is a figure of a journey alone: it has no closed form, and needs no second system or timing errors.
@@ -136,23 +139,14 @@ impl Measure {
     }
 }
 
-impl Results {
-    /// The figures of some measures; `None` for each that is not known.
-    pub(super) fn figures(&self, measures: &[Measure]) -> Vec<Option<f64>> {
-        measures.iter().map(|measure| measure.of(self)).collect()
-    }
+/// Returns what must be computed for some measures.
+pub(crate) fn needs(measures: &[Measure]) -> Vec<Needs> {
+    measures.iter().map(|measure| measure.needs()).collect()
 }
 
-impl DesignMetrics {
-    /// A measure; `None` if it is not known, or has no closed form.
-    pub fn figure(&self, measure: Measure) -> Option<f64> {
-        measure.of(&Results { head: Some(*self), ..Results::default() })
-    }
-
-    /// The figure for goals and limits: infinite if it is not known.
-    pub(crate) fn cost_figure(&self, measure: Measure) -> f64 {
-        self.figure(measure).unwrap_or(f64::INFINITY)
-    }
+/// Returns the figures of some measures in the results of a run; `None` for each that is not known.
+pub(crate) fn figures(results: &Results, measures: &[Measure]) -> Vec<Option<f64>> {
+    measures.iter().map(|measure| measure.of(results)).collect()
 }
 
 /// The measures of an estimate that a run with timing errors has, too.

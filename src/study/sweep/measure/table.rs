@@ -1,6 +1,6 @@
 //! The table of measures.
 
-use crate::sweep::results::Results;
+use zsim_run::{Needs, Results};
 
 /// A measure in the table.
 pub(super) struct Entry {
@@ -11,37 +11,6 @@ pub(super) struct Entry {
     pub short: &'static str,
     pub quantity: &'static str,
     pub unit: Unit,
-}
-
-/// What must be computed for a measure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum Needs {
-    /// The closed form of the linearised head, or a gain measurement.
-    Head,
-    /// The simulated swing of the head without ray casting.
-    Swing,
-    /// The swing in a journey, else the closed form.
-    SwingOrHead,
-    /// The open loop, from a recording.
-    OpenLoop,
-    /// The open loop, with the clock offset over time as detail of the run.
-    ClockCurve,
-    /// The closed loop, from a recording.
-    ClosedLoop,
-    /// The closed loop, and the information bound of the recording.
-    SlamBound,
-    /// An estimate whose cloud is compared with the true surfaces.
-    Cloud,
-    /// The same, and a second estimate from the recording of a reference system.
-    Reference,
-    /// A run with timing errors.
-    Timing,
-    /// The computing time of the open loop.
-    OpenLoopTime,
-    /// The computing time of the closed loop.
-    ClosedLoopTime,
-    /// The computing time of the run.
-    WallClock,
 }
 
 /// Display unit in tables and on axes, and the factor from the unit of the key to it.

@@ -1,0 +1,232 @@
+//! The page of a gain measurement.
+
+use super::bode::LOWEST_SHARE;
+use super::curve::{MIN_COHERENCE, SIGMAS_95};
+use super::{GainCurve, GainPoint, SwingStudy, axis_name, peak_table, swing_figure};
+use crate::HeadError;
+use std::f64::consts::TAU;
+use zsim_dynamics::HeadModel;
+use zsim_motion::Axis;
+use zsim_report::page::{Abscissa, AxisGains, Chart, Curve, CurveStyle, GainsPage, Ordinate, PagePlot, PageTable};
+
+/// Maximum number of frequencies of a chart; more are thinned, and the largest gain of each interval is kept.
+const MAX_LINES: usize = 2_000;
+
+/// The page of a gain measurement as HTML; the same curves give the same bytes.
+///
+/// `name` is the name of the head.
+///
+/// # Errors
+/// When a plot fails, or a value cannot be written as JSON.
+pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingStudy]) -> Result<String, HeadError> {
+    let plots = match swings {
+        [] => Vec::new(),
+        swings => vec![PagePlot { name: "By swing amplitude".to_owned(), svg: swing_figure(swings).svg()? }],
+    };
+    let page = GainsPage {
+        name: name.to_owned(),
+        summary: summary(head, curves),
+        tables: vec![peak_table(curves), modes(head)],
+        axes: curves.iter().map(axis_gains).collect(),
+        plots,
+    };
+    Ok(page.html()?)
+}
+
+/// Natural frequencies, the highest peak, and the difference between simulation and closed form.
+fn summary(head: &HeadModel, curves: &[GainCurve]) -> String {
+    let modes: Vec<String> = head.linear_modes().iter().map(|mode| format!("{:.2}", mode.frequency_hz)).collect();
+    let mut text = format!("Natural frequencies: {} Hz.", modes.join(", "));
+    let peaks = curves.iter().filter_map(|curve| Some((curve.axis, curve.peak?, curve.peak_model)));
+    let peaks: Vec<_> = peaks.collect();
+    if let Some((axis, peak, _)) = peaks.iter().max_by(|a, b| a.1.gain.total_cmp(&b.1.gain)) {
+        text += &format!(" Highest gain: {:.1} at {:.2} Hz, {}.", peak.gain, peak.freq_hz, axis_title(*axis));
+    }
+    let differences = peaks.iter().filter_map(|(_, peak, model)| Some((peak.gain / (*model)?.gain - 1.0).abs()));
+    if let Some(largest) = differences.reduce(f64::max) {
+        text += &format!(" Simulated and closed-form peak gains differ by at most {:.1} %.", 100.0 * largest);
+    }
+    text
+}
+
+/// The modes, slowest first.
+fn modes(head: &HeadModel) -> PageTable {
+    let rows = head.linear_modes().iter().map(|mode| {
+        vec![
+            mode.kind.name().to_owned(),
+            format!("{:.3}", mode.frequency_hz),
+            format!("{:.3}", mode.damped_frequency_hz()),
+            format!("{:.4}", mode.damping_ratio),
+        ]
+    });
+    let header = ["mode", "natural Hz", "damped Hz", "damping ratio"].map(str::to_owned).to_vec();
+    PageTable { title: "Modes of the head at rest".to_owned(), header, rows: rows.collect(), ..PageTable::default() }
+}
+
+/// Quantity and direction of an axis.
+fn axis_title(axis: Axis) -> &'static str {
+    match axis {
+        Axis::X => "acceleration along x",
+        Axis::Y => "acceleration along y",
+        Axis::Z => "acceleration along z",
+        Axis::Roll => "angular rate about x",
+        Axis::Pitch => "angular rate about y",
+        Axis::Yaw => "angular rate about z",
+    }
+}
+
+fn axis_gains(curve: &GainCurve) -> AxisGains {
+    let points = with_model_peak(&thinned(&curve.points), curve);
+    let title = axis_title(curve.axis);
+    AxisGains {
+        axis: axis_name(curve.axis),
+        title: title[..1].to_uppercase() + &title[1..],
+        charts: vec![vec![gain_chart(&points)], vec![phase_chart(&points), coherence_chart(&points)]],
+    }
+}
+
+/// At most [`MAX_LINES`] points, evenly distributed over the logarithm of the frequency.
+fn thinned(points: &[GainPoint]) -> Vec<GainPoint> {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
+    if points.len() <= MAX_LINES {
+        return points.to_vec();
+    }
+    let per_log = MAX_LINES as f64 / (last.freq_hz / first.freq_hz).ln();
+    let interval = |p: &GainPoint| ((p.freq_hz / first.freq_hz).ln() * per_log) as usize;
+    let intervals = points.chunk_by(|a, b| interval(a) == interval(b));
+    intervals.filter_map(|some| some.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).copied()).collect()
+}
+
+/// The points, and the peak of the closed form between them, where only the closed form has a value.
+fn with_model_peak(points: &[GainPoint], curve: &GainCurve) -> Vec<GainPoint> {
+    let mut all = points.to_vec();
+    let Some(peak) = curve.peak_model else { return all };
+    let after = all.partition_point(|p| p.freq_hz < peak.freq_hz);
+    if let [before, next] = &points[after.saturating_sub(1)..points.len().min(after + 1)] {
+        let share = (peak.freq_hz - before.freq_hz) / (next.freq_hz - before.freq_hz);
+        let turn = wrapped(next.phase_model_rad - before.phase_model_rad);
+        let none = f64::NAN;
+        all.insert(
+            after,
+            GainPoint {
+                freq_hz: peak.freq_hz,
+                gain_model: peak.gain,
+                phase_model_rad: before.phase_model_rad + share * turn,
+                gain: none,
+                gain_sigma: none,
+                coherence: none,
+                phase_rad: none,
+            },
+        );
+    }
+    all
+}
+
+/// The angle between -pi and pi that differs by whole turns.
+fn wrapped(angle_rad: f64) -> f64 {
+    angle_rad - TAU * (angle_rad / TAU).round()
+}
+
+fn chart(title: &str, label: &str, ordinate: Ordinate, points: &[GainPoint], curves: Vec<Curve>) -> Chart {
+    Chart {
+        title: title.to_owned(),
+        label: label.to_owned(),
+        abscissa: Abscissa::Frequency,
+        ordinate,
+        x: points.iter().map(|p| p.freq_hz).collect(),
+        curves,
+    }
+}
+
+fn curve(name: &str, style: CurveStyle, points: &[GainPoint], value: impl Fn(&GainPoint) -> f64) -> Curve {
+    Curve { name: name.to_owned(), style, values: points.iter().map(value).collect() }
+}
+
+/// A measured value; NaN if the coherence is too low.
+fn measured(p: &GainPoint, value: f64) -> f64 {
+    if p.coherence >= MIN_COHERENCE { value } else { f64::NAN }
+}
+
+fn gain_chart(points: &[GainPoint]) -> Chart {
+    let edge =
+        |sign: f64| move |p: &GainPoint| f64::max(p.gain + sign * SIGMAS_95 * p.gain_sigma, LOWEST_SHARE * p.gain);
+    let curves = vec![
+        curve("95 % band", CurveStyle::BandTop, points, edge(1.0)),
+        curve("lower edge", CurveStyle::BandBottom, points, edge(-1.0)),
+        curve("simulated", CurveStyle::Measured, points, |p| measured(p, p.gain)),
+        curve("closed form", CurveStyle::Model, points, |p| p.gain_model),
+    ];
+    chart("Gain", "Head over base", Ordinate::Logarithmic, points, curves)
+}
+
+/// The phase without jumps: that of the closed form is continuous, and the measured one is within half a turn of it.
+fn phase_chart(points: &[GainPoint]) -> Chart {
+    let mut model = Vec::with_capacity(points.len());
+    for p in points {
+        let before = model.last().copied().unwrap_or(0.0);
+        model.push(before + wrapped(p.phase_model_rad - before));
+    }
+    let simulated = points.iter().zip(&model).map(|(p, model)| measured(p, model + wrapped(p.phase_rad - model)));
+    let degrees = |values: Vec<f64>| values.into_iter().map(f64::to_degrees).collect();
+    let (simulated, model) = (degrees(simulated.collect()), degrees(model));
+    let curves = vec![
+        Curve { name: "simulated".to_owned(), style: CurveStyle::Measured, values: simulated },
+        Curve { name: "closed form".to_owned(), style: CurveStyle::Model, values: model },
+    ];
+    chart("Phase", "Phase (\u{b0})", Ordinate::Degrees, points, curves)
+}
+
+fn coherence_chart(points: &[GainPoint]) -> Chart {
+    let curves = vec![curve("simulated", CurveStyle::Measured, points, |p| p.coherence)];
+    chart("Coherence", "Coherence", Ordinate::Linear, points, curves)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A resonance at 1 Hz with a damping ratio of 2 %, whose phase falls from 0 to -180 degrees.
+    fn resonance(freq_hz: f64) -> GainPoint {
+        let response =
+            nalgebra::Complex::new(1.0, 0.0) / nalgebra::Complex::new(1.0 - freq_hz * freq_hz, 2.0 * 0.02 * freq_hz);
+        let (gain, phase_rad) = response.to_polar();
+        GainPoint {
+            freq_hz,
+            gain,
+            coherence: 1.0,
+            gain_sigma: 0.0,
+            gain_model: gain,
+            phase_rad,
+            phase_model_rad: phase_rad,
+        }
+    }
+
+    #[test]
+    fn a_thinned_curve_keeps_its_peak() {
+        let points: Vec<GainPoint> = (1..=40_000).map(|k| resonance(f64::from(k) * 2.5e-4)).collect();
+        let kept = thinned(&points);
+        assert!(kept.len() <= MAX_LINES + 1, "{}", kept.len());
+        assert!(kept.windows(2).all(|pair| pair[0].freq_hz < pair[1].freq_hz));
+        // The highest peak of this resonance is 1 / (2 zeta sqrt(1 - zeta^2)) = 25.005.
+        let largest = kept.iter().map(|p| p.gain).fold(0.0, f64::max);
+        assert!((largest - 25.005).abs() < 0.01, "{largest}");
+    }
+
+    #[test]
+    fn a_phase_that_passes_half_a_turn_does_not_jump() {
+        // Two resonances in series: the phase falls to -360 degrees, the argument jumps to +180 on the way.
+        let points: Vec<GainPoint> = (1..400)
+            .map(|k| {
+                let p = resonance(f64::from(k) * 0.01);
+                let twice = wrapped(2.0 * p.phase_rad);
+                GainPoint { phase_rad: twice + if k % 2 == 0 { TAU } else { 0.0 }, phase_model_rad: twice, ..p }
+            })
+            .collect();
+        let chart = phase_chart(&points);
+        for curve in &chart.curves {
+            let largest = curve.values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+            assert!(largest < 90.0, "{}: {largest}", curve.name);
+            assert!((curve.values.last().unwrap() + 360.0).abs() < 5.0, "{}", curve.name);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Parts, springs and cords of a head, as the view draws them.
+
+use super::{Block, Link};
+use zsim_base::geometry::Vector;
+use zsim_dynamics::{ElementSpec, LinkageSpec, PartSpec, PlacementSpec};
+use zsim_elasticity::SpringSpec;
+
+/// Dimensions with which a spring is drawn if only its stiffness is known.
+struct DrawnCoil {
+    radius_m: f64,
+    wire_diameter_m: f64,
+    coils: f64,
+}
+
+const ASSUMED_COIL: DrawnCoil = DrawnCoil { radius_m: 0.0125, wire_diameter_m: 0.002, coils: 10.0 };
+
+/// The elements between base and head; empty for a rigid or actuated mount.
+pub fn of(linkage: &LinkageSpec) -> Vec<Link> {
+    match linkage {
+        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => Vec::new(),
+        LinkageSpec::Spring { spring: spec, base_from_spring, head_from_spring, .. } => {
+            vec![spring(spec, base_from_spring, head_from_spring)]
+        }
+        LinkageSpec::Suspension { elements, .. } => elements.iter().filter_map(element).collect(),
+    }
+}
+
+/// The blocks among the parts of a head; bodies have no shape.
+pub fn blocks(parts: &[PartSpec]) -> Vec<Block> {
+    let block = |part: &PartSpec| match part {
+        PartSpec::Block { size_m, centre_m, .. } => {
+            Some(Block { centre_in_head: Vector::from(*centre_m), size_m: Vector::from(*size_m) })
+        }
+        PartSpec::Body { .. } => None,
+    };
+    parts.iter().filter_map(block).collect()
+}
+
+/// Whether a spring of the linkage is specified by stiffness only, and therefore drawn with assumed dimensions.
+pub fn is_assumed(linkage: &LinkageSpec) -> bool {
+    let by_stiffness = |spec: &SpringSpec| matches!(spec.resolved(), Ok(SpringSpec::Stiffness { .. }));
+    match linkage {
+        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => false,
+        LinkageSpec::Spring { spring, .. } => by_stiffness(spring),
+        LinkageSpec::Suspension { elements, .. } => {
+            elements.iter().any(|element| matches!(element, ElementSpec::Spring(one) if by_stiffness(&one.spring)))
+        }
+    }
+}
+
+fn element(element: &ElementSpec) -> Option<Link> {
+    match element {
+        ElementSpec::Spring(element) => {
+            Some(spring(&element.spring, &element.base_from_spring, &element.head_from_spring))
+        }
+        ElementSpec::Cord(cord) => Some(Link::Straight {
+            point_in_base: Vector::from(cord.base_point_m),
+            point_in_head: Vector::from(cord.head_point_m),
+        }),
+        ElementSpec::UniversalJoint(joint) => Some(Link::Straight {
+            point_in_base: Vector::from(joint.base_from_joint.position_m),
+            point_in_head: Vector::zeros(),
+        }),
+        ElementSpec::Float(_) => None,
+    }
+}
+
+fn spring(spec: &SpringSpec, base_from_foot: &PlacementSpec, head_from_top: &PlacementSpec) -> Link {
+    let drawn = match spec.resolved() {
+        Ok(SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, .. }) => DrawnCoil {
+            radius_m: 0.5e-3 * coil_diameter_mm,
+            wire_diameter_m: 1e-3 * wire_diameter_mm,
+            coils: active_coils,
+        },
+        _ => ASSUMED_COIL,
+    };
+    Link::Spring {
+        base_from_foot: base_from_foot.pose(),
+        head_from_top: head_from_top.pose(),
+        coil_radius_m: drawn.radius_m,
+        wire_diameter_m: drawn.wire_diameter_m,
+        coils: drawn.coils,
+    }
+}

@@ -1,0 +1,272 @@
+//! Open-loop estimation from a recording, as it would run online.
+
+use super::cadence::Cadence;
+use super::events::Events;
+use super::read_ahead::{MeasurementStream, read_ahead};
+use super::{MapOptions, ProgressMonitor, RunError, Stage, StageData};
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+use std::time::Instant;
+use zsim_base::geometry::{PoseCovariance, Trajectory};
+use zsim_base::measurement::{Calibration, LidarCorrection, Measurement};
+use zsim_base::parallel::Stopped;
+use zsim_base::time::{Span, Stamp};
+use zsim_estimation::{
+    EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
+    covariance_blocks, radius_99,
+};
+use zsim_evaluation::{DeadReckoning, EvaluationError, RestDetection};
+use zsim_recording::{Reader, RecordingError, Selection, TumWriter};
+
+/// Number of measurements between progress reports: about 1 s of data.
+const PROGRESS_INTERVAL: usize = 200;
+
+/// Time between stored covariances.
+const COVARIANCE_PERIOD: Span = Span::from_nanos(100_000_000);
+
+/// Result of the open-loop estimation.
+pub(super) struct OpenLoopRun {
+    /// The estimate.
+    pub map_from_head: Trajectory,
+    /// Covariances of the poses in the map frame, at 10 Hz.
+    pub covariances: Vec<(Stamp, PoseCovariance)>,
+    /// 99 % radii of the position error relative to the alignment of the first seconds, at the same stamps, m.
+    pub radii_m: Vec<f64>,
+    /// Covariances of marked poses of the first seconds relative to the alignment over these.
+    pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
+    /// The estimated clock offset over lidar time, s.
+    pub clock_offsets: Vec<(Stamp, f64)>,
+    /// Estimated correction of the lidar calibration that the poses are consistent with (gyroscope axes).
+    pub lidar: LidarCorrection,
+    /// The same correction along the IMU axes, as in a calibration file.
+    pub calibrated_lidar: LidarCorrection,
+    /// Losses and notes.
+    pub events: Events,
+    /// Number of IMU samples in the recording.
+    pub samples: usize,
+    /// Reports of the windows, in order of time.
+    pub windows: Vec<WindowReport>,
+    /// Warnings of the estimator, in order of time.
+    pub warnings: Vec<Warning>,
+    /// First and last stamp of the recording's measurements.
+    pub recorded: (Stamp, Stamp),
+    /// Number of lidar returns in the recording.
+    pub returns: usize,
+    /// Duration of the recording, s.
+    pub acquisition_s: f64,
+    /// Trajectory by IMU dead reckoning, for comparison.
+    pub dead_reckoning: Result<Trajectory, EvaluationError>,
+    /// Observations for the closed loop and the map; empty without `recording_surfels`.
+    pub observed: ObservedSurfels,
+    /// Wall-clock time, including reading but not building the observed surfels, s.
+    pub wall_s: f64,
+    /// Run time of each part of the estimator.
+    pub timing: Timing,
+}
+
+/// Options of the open loop.
+#[derive(Clone, Copy)]
+pub(super) struct OpenLoopOptions<'a> {
+    pub estimator: &'a EstimatorSpec,
+    pub calibration: &'a Calibration,
+    /// Whether to keep the observations for the closed loop and the map.
+    pub recording_surfels: bool,
+    /// The map in which to localise the head; `None` to start a new map.
+    pub map: Option<&'a MapOptions>,
+}
+
+/// Runs the estimator over the recording of `reader`.
+///
+/// Poses are written to the TUM file `tum`, if given, as they become final. `expected_s` is the length of the recording,
+/// if it is known, for the progress.
+pub(super) fn run_open_loop(
+    reader: &Reader,
+    selection: &Selection,
+    options: OpenLoopOptions,
+    tum: Option<&Path>,
+    expected_s: Option<f64>,
+    watch: &mut ProgressMonitor,
+) -> Result<OpenLoopRun, RunError> {
+    let started = Instant::now();
+    let estimator = Estimator::new(options.estimator, options.calibration)?;
+    let estimator = if options.recording_surfels { estimator.recording_surfels() } else { estimator };
+    let mut estimator = match options.map {
+        Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
+        None => estimator,
+    };
+    watch.data(StageData::Start { stage: Stage::Estimating, calibration: options.calibration });
+    let tum = tum.map(TumWriter::create).transpose()?;
+    let mut poses = PoseOutput { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
+    let mut inputs = InputSummary::new(options.calibration);
+    let (pushed, loss) = read_ahead(reader, selection, |measurements| {
+        push_all(measurements, &mut estimator, &mut inputs, &mut poses, expected_s, watch)
+    });
+    if let Err(RunError::Stopped(_)) = pushed {
+        poses.close()?;
+        return Err(Stopped.into());
+    }
+    pushed?;
+    let result = estimator.finish()?;
+    poses.take(&result.poses)?;
+    poses.close()?;
+    watch.data(StageData::Poses(&result.poses));
+    let PoseOutput { map_from_head, covariances, radii_m, .. } = poses;
+
+    // The reported offsets relate to the recorded stamps, without the shift that the selection applies and with the steps of
+    // the clocks, which the reader removes.
+    let shift_s = selection.imu_shift().seconds();
+    let stepped_s = |at: Stamp| {
+        let before = loss.clock_steps.iter().filter(|step| step.at <= at);
+        before
+            .map(|step| if step.topic == selection.imu_topic { step.by } else { Span::ZERO - step.by }.seconds())
+            .sum::<f64>()
+    };
+    let mut events = Events::default();
+    loss.sentences().into_iter().for_each(|sentence| events.add_loss("recording", sentence));
+    inputs.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
+    inputs.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
+    result.located.iter().for_each(|located| events.add_note("located", located_message(located)));
+    loss.notes().into_iter().for_each(|sentence| events.add_note("recording", sentence));
+    let start = inputs.start();
+    events.add_clock_steps(&loss.clock_steps, start);
+    events.add_warnings(&result.warnings, start);
+    Ok(OpenLoopRun {
+        map_from_head,
+        covariances,
+        radii_m,
+        aligned_covariances: result.aligned_covariances,
+        timing: result.windows.iter().map(|window| window.timing).sum(),
+        clock_offsets: result.clock_offsets.into_iter().map(|(at, s)| (at, s - shift_s + stepped_s(at))).collect(),
+        lidar: result.lidar,
+        calibrated_lidar: result.calibrated_lidar,
+        events,
+        samples: inputs.imu.count(),
+        recorded: (start, start + Span::from_seconds(inputs.seconds())),
+        windows: result.windows,
+        warnings: result.warnings,
+        returns: inputs.returns,
+        acquisition_s: inputs.seconds(),
+        dead_reckoning: inputs.dead_reckoning.finish(),
+        wall_s: started.elapsed().as_secs_f64() - result.observed.elapsed_s(),
+        observed: result.observed,
+    })
+}
+
+/// Pushes all measurements into `estimator` and writes the poses that become final.
+fn push_all(
+    measurements: &mut MeasurementStream,
+    estimator: &mut Estimator,
+    inputs: &mut InputSummary,
+    poses: &mut PoseOutput,
+    expected_s: Option<f64>,
+    watch: &mut ProgressMonitor,
+) -> Result<(), RunError> {
+    for (index, measurement) in measurements.enumerate() {
+        let measurement = measurement?;
+        inputs.take(&measurement);
+        if let Measurement::Lidar(scan) = &measurement {
+            watch.data(StageData::Scan(scan));
+        }
+        estimator.push(measurement)?;
+        if index % PROGRESS_INTERVAL == 0 {
+            let newest = estimator.take_poses();
+            poses.take(&newest)?;
+            watch.data(StageData::Poses(&newest));
+            poses
+                .evidence(estimator, inputs)
+                .into_iter()
+                .for_each(|evidence| watch.data(StageData::Evidence(evidence)));
+            watch.progress(Stage::Estimating, inputs.seconds(), expected_s);
+            if watch.is_stopped() {
+                return Err(Stopped.into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Message on the localisation in the map.
+fn located_message(located: &LocalisedPose) -> String {
+    format!(
+        "localised in the map: {:.0} % of the surfels of the first window match, residual {:.1} mm RMS",
+        100.0 * located.inlier_ratio,
+        1e3 * located.residual_rms_m
+    )
+}
+
+/// Poses in memory, and in a TUM file if requested.
+struct PoseOutput {
+    tum: Option<TumWriter<BufWriter<File>>>,
+    map_from_head: Trajectory,
+    covariances: Vec<(Stamp, PoseCovariance)>,
+    radii_m: Vec<f64>,
+}
+
+impl PoseOutput {
+    fn take(&mut self, poses: &[EstimatedPose]) -> Result<(), RecordingError> {
+        for pose in poses {
+            if let Some(tum) = &mut self.tum {
+                tum.pose(pose.stamp, &pose.map_from_head)?;
+            }
+            let name = "the estimate".to_owned();
+            let pushed = self.map_from_head.push(pose.stamp, pose.map_from_head);
+            pushed.map_err(|source| RecordingError::Trajectory { name, source })?;
+            if self.covariances.last().is_none_or(|(last, _)| pose.stamp - *last >= COVARIANCE_PERIOD) {
+                self.covariances.push((pose.stamp, pose.covariance));
+                self.radii_m.push(radius_99(&covariance_blocks(&pose.covariance_against_gauge).0));
+            }
+        }
+        Ok(())
+    }
+
+    /// The evidence on the poses so far; `None` without poses.
+    fn evidence<'a>(&self, estimator: &'a Estimator, inputs: &InputSummary) -> Option<Evidence<'a>> {
+        let estimated = self.map_from_head.span()?;
+        let (windows, warnings) = (estimator.windows(), estimator.warnings());
+        Some(Evidence { windows, warnings, samples: inputs.imu.count(), recorded: estimated, estimated })
+    }
+
+    /// Completes the TUM file.
+    fn close(&mut self) -> Result<(), RecordingError> {
+        self.tum.take().map_or(Ok(()), TumWriter::finish)
+    }
+}
+
+/// Counts, time spans and dead reckoning of the measurements.
+struct InputSummary {
+    imu: Cadence,
+    lidar: Cadence,
+    returns: usize,
+    dead_reckoning: DeadReckoning,
+}
+
+impl InputSummary {
+    fn new(calibration: &Calibration) -> Self {
+        let dead_reckoning = DeadReckoning::new(&calibration.head_from_imu, RestDetection::default());
+        Self { imu: Cadence::default(), lidar: Cadence::default(), returns: 0, dead_reckoning }
+    }
+
+    fn take(&mut self, measurement: &Measurement) {
+        match measurement {
+            Measurement::Imu(sample) => {
+                self.imu.take(sample.stamp);
+                self.dead_reckoning.push(sample);
+            }
+            Measurement::Lidar(scan) => {
+                self.lidar.take(scan.stamp);
+                self.returns += scan.returns.len();
+            }
+        }
+    }
+
+    fn start(&self) -> Stamp {
+        let spans = [self.imu.span(), self.lidar.span()];
+        spans.into_iter().flatten().map(|(first, _)| first).min().unwrap_or_default()
+    }
+
+    fn seconds(&self) -> f64 {
+        let longest = |cadence: &Cadence| cadence.span().map_or(0.0, |(first, last)| last.seconds_since(first));
+        longest(&self.imu).max(longest(&self.lidar))
+    }
+}
