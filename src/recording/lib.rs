@@ -19,7 +19,7 @@
 //! Stamps are from the sensors' own clocks (poses: the lidar's). The log time of a message is its arrival in true time.
 //!
 //! [`TumWriter`] and [`read_tum`] handle trajectories ([`TrajectoryFile`] also in the formats of EuRoC and KITTI), [`PlyWriter`],
-//! [`PlyReader`] and [`LasWriter`] point clouds, [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`write_result`]
+//! [`PlyReader`] and [`LasWriter`] point clouds, [`write_surfel_map`] and [`read_surfel_map`] surfel maps. [`ResultWriter`]
 //! writes an estimate as a recording for viewers, [`write_rosbag2_metadata`] the metadata of a folder of rosbag2.
 //!
 //! On a running robot [`Incoming`] decodes messages as they arrive, [`ReceivedWriter`] records them, and
@@ -83,7 +83,7 @@ pub use playback::RecordedMessage;
 pub use ply::{PlyReader, PlyWriter};
 pub use reader::Reader;
 pub use received::ReceivedWriter;
-pub use result::write_result;
+pub use result::ResultWriter;
 pub use rosbag2::write_rosbag2_metadata;
 pub use selection::{Selection, TopicPreference, UnusedTopic};
 pub use trajectory_file::{PoseTimes, TrajectoryFile};

@@ -20,62 +20,86 @@ const CLOUD_PERIOD: Span = Span::from_nanos(500_000_000);
 /// Maximum number of points in one `/cloud` message: 20 bytes each.
 const CLOUD_POINTS: usize = 50_000;
 
-/// Writes an estimate to a new MCAP file at `path`.
+/// Writes an estimate as a new MCAP file.
 ///
 /// Topics: `/path`; `/pose` with the given covariances, each at the stamp of a pose and in order of time; `/tf` (`map`
 /// to `body_frame`, one transform per pose); `/cloud` (x, y, z, intensity, error, in `map`), in the order of the given
 /// points.
-///
-/// # Errors
-/// When the file cannot be created or written, or a stamp does not fit into a message.
-pub fn write_result(
-    path: &Path,
-    body_frame: &str,
-    map_from_body: &Trajectory,
-    covariances: &[(Stamp, PoseCovariance)],
-    cloud: impl IntoIterator<Item = CloudPoint>,
-) -> Result<(), RecordingError> {
-    let file = files::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
-    let mcap = McapWriter::new(file, BTreeMap::new())?;
-    let mut result = ResultWriter { mcap, body_frame, covariances, last: Stamp::from_nanos(0), gathered: Vec::new() };
-    result.path(map_from_body)?;
-    let mut poses = map_from_body.iter().peekable();
-    for point in cloud {
-        if result.is_full_before(&point) {
-            while let Some((stamp, pose)) = poses.next_if(|(stamp, _)| *stamp <= result.latest_gathered()) {
-                result.transform(stamp, pose)?;
-            }
-            result.cloud()?;
-        }
-        result.gathered.push(point);
-    }
-    for (stamp, pose) in poses {
-        result.transform(stamp, pose)?;
-    }
-    result.cloud()?;
-    result.mcap.finish()
-}
-
-struct ResultWriter<'a> {
+pub struct ResultWriter<'a> {
     mcap: McapWriter,
     body_frame: &'a str,
+    map_from_body: &'a Trajectory,
+    /// Number of written poses.
+    written: usize,
     covariances: &'a [(Stamp, PoseCovariance)],
     /// Log time of the previous message: it never decreases, although point stamps may.
     last: Stamp,
     gathered: Vec<CloudPoint>,
 }
 
-impl ResultWriter<'_> {
+impl<'a> ResultWriter<'a> {
+    /// Creates the file at `path` and writes the path of the body.
+    ///
+    /// # Errors
+    /// When the file cannot be created or written, or a stamp does not fit into a message.
+    pub fn create(
+        path: &Path,
+        body_frame: &'a str,
+        map_from_body: &'a Trajectory,
+        covariances: &'a [(Stamp, PoseCovariance)],
+    ) -> Result<Self, RecordingError> {
+        let file = files::create(path).map_err(|source| RecordingError::File { path: path.to_owned(), source })?;
+        let mcap = McapWriter::new(file, BTreeMap::new())?;
+        let (last, gathered) = (Stamp::from_nanos(0), Vec::new());
+        let mut result = Self { mcap, body_frame, map_from_body, written: 0, covariances, last, gathered };
+        result.path()?;
+        Ok(result)
+    }
+
+    /// Adds a point of the cloud, in the map frame.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or a stamp does not fit into a message.
+    pub fn point(&mut self, point: CloudPoint) -> Result<(), RecordingError> {
+        if self.is_full_before(&point) {
+            self.transforms_until(self.latest_gathered())?;
+            self.cloud()?;
+        }
+        self.gathered.push(point);
+        Ok(())
+    }
+
+    /// Writes the remaining poses and points, and completes the file.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or a stamp does not fit into a message.
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        if let Some((_, last)) = self.map_from_body.span() {
+            self.transforms_until(last)?;
+        }
+        self.cloud()?;
+        self.mcap.finish()
+    }
+
+    fn transforms_until(&mut self, end: Stamp) -> Result<(), RecordingError> {
+        let (stamps, poses) = (self.map_from_body.stamps(), self.map_from_body.poses());
+        while let Some(stamp) = stamps.get(self.written).filter(|stamp| **stamp <= end) {
+            self.transform(*stamp, &poses[self.written])?;
+            self.written += 1;
+        }
+        Ok(())
+    }
+
     fn log_time(&mut self, stamp: Stamp) -> Stamp {
         self.last = self.last.max(stamp);
         self.last
     }
 
-    fn path(&mut self, map_from_body: &Trajectory) -> Result<(), RecordingError> {
-        let Some((first, _)) = map_from_body.span() else { return Ok(()) };
+    fn path(&mut self) -> Result<(), RecordingError> {
+        let Some((first, _)) = self.map_from_body.span() else { return Ok(()) };
         let mut next = first;
         let mut selected = Vec::new();
-        for (stamp, pose) in map_from_body.iter() {
+        for (stamp, pose) in self.map_from_body.iter() {
             if stamp >= next {
                 selected.push((stamp, pose));
                 next = stamp + PATH_PERIOD;

@@ -1,9 +1,10 @@
 //! The plots of a run, and the files of the report.
 
 use super::RunError;
+use super::beams::ProjectedBeam;
 use super::decimation::decimated;
 use super::page::RunResults;
-use super::register::{ProjectedBeam, SampledBeam};
+use super::register::SampledBeam;
 use super::result_files::METRICS;
 use rayon::prelude::*;
 use std::collections::BTreeSet;

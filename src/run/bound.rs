@@ -1,5 +1,6 @@
 //! The information bound of a recording in its scene.
 
+use super::beams::{BeamReader, read_beams};
 use super::calibration::calibration;
 use super::sensor_models::RecordedSensors;
 use super::true_clock::TrueClock;
@@ -7,8 +8,7 @@ use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError, Stage};
 use rayon::prelude::*;
 use zsim_base::geometry::{Pose, Rotation, Vector};
-use zsim_base::measurement::{Calibration, ImuSample, LidarReturn, LidarScan, Measurement};
-use zsim_base::parallel::Stopped;
+use zsim_base::measurement::{Calibration, ImuSample, LidarReturn, LidarScan};
 use zsim_base::time::{Span, Stamp};
 use zsim_evaluation::{BeamObservation, BoundModel, FisherInformation, InformationBound, MapKnowledge};
 use zsim_recording::{Reader, RecordingError, Selection, TopicPreference, Truth};
@@ -62,11 +62,11 @@ pub fn information_bound(
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(RunError::Plan { what: "information bound", message });
     };
-    bound.of_measurements(reader, &selection, &mut |stamp| {
-        watch.check_stop()?;
+    read_beams((reader, &selection), true, &mut [&mut bound], &mut |stamp| {
         watch.progress(Stage::Bounding, stamp.seconds_since(first), Some(last.seconds_since(first)));
-        Ok(())
-    })
+        watch.check_stop()
+    })?;
+    bound.finish()
 }
 
 /// Sensor model of the bound: the specs in the manifest of a simulated recording, else only the sensor noise.
@@ -138,51 +138,12 @@ impl<'a> BoundAccumulator<'a> {
         }
     }
 
-    /// The bound of all measurements of `selection`; `on_scan` is called with the stamp of each scan.
+    /// The bound of the measurements so far.
     ///
     /// # Errors
-    /// If the recording cannot be read, or if `on_scan` fails.
-    pub(super) fn of_measurements(
-        mut self,
-        reader: &Reader,
-        selection: &Selection,
-        on_scan: &mut dyn FnMut(Stamp) -> Result<(), Stopped>,
-    ) -> Result<RecordingBound, RunError> {
-        let mut truth = TruthCursor::new(reader.truth());
-        for measurement in reader.measurements(selection) {
-            match measurement? {
-                Measurement::Imu(sample) => self.add_imu_sample(&sample),
-                Measurement::Lidar(scan) => {
-                    on_scan(scan.stamp)?;
-                    self.add_scan(&scan, &mut truth)?;
-                }
-            }
-        }
+    /// If they do not determine it.
+    pub(super) fn finish(self) -> Result<RecordingBound, RunError> {
         Ok(RecordingBound { bound: self.information.bound()?, beams: self.beams, rejected: self.rejected })
-    }
-
-    /// Adds the next IMU sample.
-    fn add_imu_sample(&mut self, sample: &ImuSample) {
-        self.information.add_imu_sample(self.clock.on_lidar_clock(sample.stamp), sample);
-    }
-
-    /// Adds the beams of the next scan.
-    fn add_scan(&mut self, scan: &LidarScan, truth: &mut TruthCursor) -> Result<(), RunError> {
-        let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
-        let scan_motion = ScanMotion::during(scan.stamp, sweep, truth)?;
-        let chunks = scan.returns.par_chunks(RAYS_TOGETHER);
-        let beams: Vec<Option<BeamObservation>> =
-            chunks.flat_map_iter(|hits| self.observations(scan, hits, &scan_motion)).collect();
-        for beam in beams {
-            match beam {
-                Some(beam) => {
-                    self.information.add_beam(&beam);
-                    self.beams += 1;
-                }
-                None => self.rejected += 1,
-            }
-        }
-        Ok(())
     }
 
     /// The observations of successive beams, each if it hit a static surface.
@@ -254,6 +215,31 @@ impl<'a> BoundAccumulator<'a> {
             hit = self.world.cast_beyond(ray, hit.distance_m, beam.timed_ray().reach_m, motion.t_s)?;
         }
         None
+    }
+}
+
+impl BeamReader for BoundAccumulator<'_> {
+    fn imu(&mut self, sample: &ImuSample) {
+        self.information.add_imu_sample(self.clock.on_lidar_clock(sample.stamp), sample);
+    }
+
+    fn scan(&mut self, scan: &LidarScan, truth: Option<&mut TruthCursor>) -> Result<(), RunError> {
+        let Some(truth) = truth else { return Ok(()) };
+        let sweep = scan.returns.iter().map(|hit| hit.offset).max().unwrap_or(Span::ZERO);
+        let scan_motion = ScanMotion::during(scan.stamp, sweep, truth)?;
+        let chunks = scan.returns.par_chunks(RAYS_TOGETHER);
+        let beams: Vec<Option<BeamObservation>> =
+            chunks.flat_map_iter(|hits| self.observations(scan, hits, &scan_motion)).collect();
+        for beam in beams {
+            match beam {
+                Some(beam) => {
+                    self.information.add_beam(&beam);
+                    self.beams += 1;
+                }
+                None => self.rejected += 1,
+            }
+        }
+        Ok(())
     }
 }
 

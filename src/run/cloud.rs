@@ -1,6 +1,7 @@
 //! Metrics of the registered cloud against the true surfaces.
 
-use super::register::{ClassCounts, ProjectedBeam, RegisteredCloud, SampledBeam};
+use super::beams::ProjectedBeam;
+use super::register::{ClassCounts, RegisteredCloud, SampledBeam};
 use super::truth_cursor::TrueState;
 use rayon::prelude::*;
 use zsim_base::geometry::{Pose, Surface, Vector};

@@ -1,6 +1,6 @@
 //! Estimation from a recording, with evaluation and output files.
 
-use super::background::with_background;
+use super::beams::{BeamReader, read_beams};
 use super::bound::{BoundAccumulator, RecordingBound};
 use super::calibration::calibration;
 use super::cloud::{Surroundings, cloud_metrics};
@@ -13,12 +13,11 @@ use super::map_options::MapOptions;
 use super::origin::Origin;
 use super::page::RunResults;
 use super::recorded_manifest::RecordedManifest;
-use super::register::{RegisteredCloud, Registration};
+use super::register::{CloudRegistration, RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
 use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, ProgressMonitor, RunError, Stage, artefacts, comparison, memory};
 use std::path::Path;
-use zsim_base::parallel::check;
 use zsim_estimation::{EstimatorSpec, Timing};
 use zsim_evaluation::MapKnowledge;
 use zsim_recording::{FoundCalibration, Reader, Selection};
@@ -178,7 +177,7 @@ impl<'a> Estimated<'a> {
         .map(Some)
     }
 
-    /// Registers the cloud along the best estimate if it is wanted, and meanwhile completes `bound` if the truth is known.
+    /// Registers the cloud along the best estimate if it is wanted, and completes `bound` if the truth is known, in one pass.
     fn register(
         &self,
         loops: &Loops,
@@ -188,25 +187,28 @@ impl<'a> Estimated<'a> {
     ) -> Result<(Option<RegisteredCloud>, Option<RecordingBound>), RunError> {
         let (best, with_truth) = (loops.best(), loops.truth.is_some());
         let registration = self.options.cloud.map(|options| Registration {
-            reader: self.reader,
-            selection: self.selection,
             calibration: &self.found.calibration,
             body_frame: &self.found.body_frame,
             map_from_head: best.map_from_head,
             covariances: best.covariances,
             lidar: best.lidar,
             returns: loops.open.returns,
-            with_truth,
             options,
         });
-        let stop = watch.stop;
-        let complete = || {
-            let bound = bound.filter(|_| with_truth)?;
-            Some(bound.of_measurements(self.reader, self.selection, &mut |_| check(stop)))
-        };
-        let register = || registration.map(|registration| registration.run(folder, watch)).transpose();
-        let (bound, registered) = with_background(complete, register);
-        Ok((registered?, bound.transpose()?))
+        let mut cloud = registration.map(|registration| registration.start(folder)).transpose()?;
+        let mut bound = bound.filter(|_| with_truth);
+        let of_cloud = cloud.iter_mut().map(|cloud| cloud as &mut dyn BeamReader);
+        let of_bound = bound.iter_mut().map(|bound| bound as &mut dyn BeamReader);
+        let mut readers: Vec<&mut dyn BeamReader> = of_cloud.chain(of_bound).collect();
+        let (first, last) = best.map_from_head.span().unwrap_or_default();
+        if !readers.is_empty() {
+            read_beams((self.reader, self.selection), with_truth, &mut readers, &mut |stamp| {
+                watch.progress(Stage::Registering, stamp.seconds_since(first), Some(last.seconds_since(first)));
+                watch.check_stop()
+            })?;
+        }
+        let bound = bound.map(BoundAccumulator::finish).transpose()?;
+        Ok((cloud.map(CloudRegistration::finish).transpose()?, bound))
     }
 
     /// Runs both loops and writes the trajectories and the map to `folder`.

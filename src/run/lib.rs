@@ -4,8 +4,8 @@
 //! the truth and writes the report. [`estimate_recording`] does the same from an existing recording.
 
 mod artefacts;
-mod background;
 mod base;
+mod beams;
 mod bound;
 mod cadence;
 mod calibration;

@@ -1,9 +1,9 @@
 //! A reference system: a second simulated system in the scene of a run, whose map the map of the run is compared with.
 
+use super::beams::ProjectedBeam;
 use super::cloud::Surroundings;
 use super::loops::Loops;
 use super::record::{description, record_together};
-use super::register::ProjectedBeam;
 use super::results::{ReferenceResults, Results};
 use super::run_recording::RunRecording;
 use super::{ProgressMonitor, ReferenceInputs, RunError, RunInputs};
@@ -101,7 +101,7 @@ impl AlignedCloud {
         let world_from_map = align_poses(pairs.truth(), pairs.estimate(), TURN_LEVER_M)?;
         let carrier = carrier_of(&simulation.inputs().head.spec);
         let surroundings = Surroundings { world: simulation.world(), carrier: &carrier };
-        let beams = recording.with(loops).static_beams(surroundings, limit, watch)?;
+        let beams = recording.static_beams(loops, surroundings, limit, || watch.check_stop())?;
         let moved = |beam: &ProjectedBeam, by: &Pose| {
             let at = |of: &Vector| by.rotation * of + by.translation.vector;
             (at(&beam.point), Some(at(&beam.origin)))

@@ -1,34 +1,23 @@
 //! Registration of the beams into a cloud: output files, points for viewers, and what the evaluation needs of them.
 
+use super::RunError;
+use super::beams::{BeamReader, EstimatedBeams, LidarModel, ProjectedBeam};
 use super::cloud_files::{CloudFiles, CloudOptions};
-use super::read_ahead::{MeasurementStream, read_ahead};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::viewer_files::write_for_result;
-use super::{ProgressMonitor, RunError, Stage};
 use std::path::Path;
-use zsim_base::geometry::{Pose, PoseCovariance, SmoothCursor, Trajectory, Vector};
-use zsim_base::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan, Measurement};
-use zsim_base::parallel::Stopped;
-use zsim_base::time::{Span, Stamp};
+use zsim_base::geometry::{PoseCovariance, Trajectory, Vector};
+use zsim_base::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan};
+use zsim_base::time::Stamp;
 use zsim_estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 use zsim_evaluation::Thinning;
-use zsim_recording::{CloudPoint, Reader, RecordingError, Selection, write_result};
+use zsim_recording::{CloudPoint, RecordingError, ResultWriter};
 use zsim_report::page::MAX_PAGE_POINTS;
 
 /// Maximum number of beams in the sample for the evaluation.
 const MAX_SAMPLED_BEAMS: usize = 100_000;
 /// Maximum number of points for viewers, in `result.mcap`; the cloud files have all points.
 const MAX_VIEWER_POINTS: usize = 1_000_000;
-/// Returns between poses farther apart than this, s, are not projected: the estimate has a pose every 10 ms, except in gaps.
-pub(super) const MAX_POSE_GAP_S: f64 = 0.1;
-
-/// A projected beam: origin and end point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ProjectedBeam {
-    pub point: Vector,
-    pub origin: Vector,
-}
-
 /// A beam of the sample for the evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampledBeam {
@@ -78,9 +67,8 @@ pub(super) struct RegisteredCloud {
 }
 
 /// Inputs of the registration.
+#[derive(Clone, Copy)]
 pub(super) struct Registration<'a> {
-    pub reader: &'a Reader,
-    pub selection: &'a Selection,
     pub calibration: &'a Calibration,
     pub body_frame: &'a str,
     pub map_from_head: &'a Trajectory,
@@ -89,57 +77,32 @@ pub(super) struct Registration<'a> {
     pub lidar: &'a LidarCorrection,
     /// Number of returns in the recording.
     pub returns: usize,
-    /// Whether to project the sample by the true poses as well.
-    pub with_truth: bool,
     /// Options of the cloud.
     pub options: CloudOptions,
 }
 
-impl Registration<'_> {
-    /// Projects all beams by the estimate and writes the cloud files, `result.mcap` and its layout to `folder`.
-    pub(super) fn run(&self, folder: &Path, watch: &mut ProgressMonitor) -> Result<RegisteredCloud, RunError> {
-        read_ahead(self.reader, self.selection, |measurements| self.project(measurements, folder, watch)).0
-    }
-
-    fn project(
-        &self,
-        measurements: &mut MeasurementStream,
-        folder: &Path,
-        watch: &mut ProgressMonitor,
-    ) -> Result<RegisteredCloud, RunError> {
+impl<'a> Registration<'a> {
+    /// Creates the files of the cloud, `result.mcap` and its layout in `folder`, and the reader of beams that writes them.
+    pub(super) fn start(self, folder: &Path) -> Result<CloudRegistration<'a>, RunError> {
         let noise = self.calibration.lidar;
-        let mut beams = BeamProjection {
-            measurements,
-            cursor: SmoothCursor::with_max_gap(self.map_from_head, Span::from_seconds(MAX_POSE_GAP_S)),
-            truth: self.with_truth.then(|| TruthCursor::new(self.reader.truth())),
+        write_for_result(folder)?;
+        let result = folder.join("result.mcap");
+        Ok(CloudRegistration {
+            estimate: EstimatedBeams::new(self.map_from_head, self.calibration, self.lidar),
             calibrated: LidarModel::calibrated(self.calibration),
-            corrected: LidarModel::corrected(self.calibration, self.lidar),
             noise,
             covariances: self.covariances,
             filter: (!self.options.keep_outliers).then(|| CloudFilter::new(noise)),
             files: CloudFiles::create(folder, self.options.format)?,
+            result: ResultWriter::create(&result, self.body_frame, self.map_from_head, self.covariances)?,
             sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
             displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
             on_page: Thinning::to_at_most(MAX_PAGE_POINTS, self.returns),
-            ready: Vec::new().into_iter(),
-            span: self.map_from_head.span(),
             projected: 0,
             class_counts: ClassCounts::default(),
             sample: Vec::new(),
             page_points: Vec::new(),
-            failure: None,
-            watch,
-        };
-        write_for_result(folder)?;
-        let result = folder.join("result.mcap");
-        write_result(&result, self.body_frame, self.map_from_head, self.covariances, beams.by_ref())?;
-        if let Some(failure) = beams.failure {
-            return Err(failure);
-        }
-        beams.files.finish()?;
-        let filtered = !self.options.keep_outliers;
-        let BeamProjection { class_counts, sample, page_points, .. } = beams;
-        Ok(RegisteredCloud { class_counts, filtered, sample, page_points })
+        })
     }
 }
 
@@ -157,117 +120,77 @@ struct Pending {
     sampled: Option<Box<ProjectedPair>>,
 }
 
-/// Projects the recording scan by scan, writes the cloud files, and iterates over the points for viewers.
-struct BeamProjection<'a, 'm, 'w, 's> {
-    measurements: &'m mut MeasurementStream<'m>,
-    cursor: SmoothCursor<'a>,
-    truth: Option<TruthCursor<'a>>,
+/// Projects the beams scan by scan, and writes the points that the filter accepts.
+pub(super) struct CloudRegistration<'a> {
+    estimate: EstimatedBeams<'a>,
     /// The lidar as calibrated, for projection by the truth.
     calibrated: LidarModel,
-    /// The lidar with the estimated correction, for projection by the estimate.
-    corrected: LidarModel,
     noise: LidarNoise,
     /// Covariances from the current stamp on.
     covariances: &'a [(Stamp, PoseCovariance)],
     filter: Option<CloudFilter<Pending>>,
     files: CloudFiles,
+    result: ResultWriter<'a>,
     sampled: Thinning,
     displayed: Thinning,
     on_page: Thinning,
-    ready: std::vec::IntoIter<CloudPoint>,
-    span: Option<(Stamp, Stamp)>,
     /// Number of projected returns.
     projected: usize,
     class_counts: ClassCounts,
     sample: Vec<SampledBeam>,
     page_points: Vec<CloudPoint>,
-    failure: Option<RunError>,
-    watch: &'w mut ProgressMonitor<'s>,
 }
 
-impl Iterator for BeamProjection<'_, '_, '_, '_> {
-    type Item = CloudPoint;
-
-    fn next(&mut self) -> Option<CloudPoint> {
-        loop {
-            if let Some(point) = self.ready.next() {
-                return Some(point);
-            }
-            match self.next_scan() {
-                Ok(Some(points)) => self.ready = points.into_iter(),
-                Ok(None) => return None,
-                Err(failure) => {
-                    self.failure = Some(failure);
-                    return None;
-                }
-            }
-        }
-    }
-}
-
-impl BeamProjection<'_, '_, '_, '_> {
-    /// Processes the next scan and returns its points for viewers.
-    fn next_scan(&mut self) -> Result<Option<Vec<CloudPoint>>, RunError> {
-        loop {
-            match self.measurements.next().transpose()? {
-                None => {
-                    let Some(filter) = self.filter.take() else { return Ok(None) };
-                    return Ok(Some(self.settle(filter.finish())?));
-                }
-                Some(Measurement::Imu(_)) => {}
-                Some(Measurement::Lidar(scan)) => {
-                    if self.watch.is_stopped() {
-                        return Err(Stopped.into());
-                    }
-                    if let Some((first, last)) = self.span {
-                        let (done_s, total_s) = (scan.stamp.seconds_since(first), last.seconds_since(first));
-                        self.watch.progress(Stage::Registering, done_s, Some(total_s));
-                    }
-                    return Ok(Some(self.register(&scan)?));
-                }
-            }
-        }
-    }
-
-    /// Projects a scan and returns the points for viewers that the filter has accepted.
-    fn register(&mut self, scan: &LidarScan) -> Result<Vec<CloudPoint>, RecordingError> {
+impl BeamReader for CloudRegistration<'_> {
+    fn scan(&mut self, scan: &LidarScan, mut truth: Option<&mut TruthCursor>) -> Result<(), RunError> {
         let mut pending = Vec::with_capacity(scan.returns.len());
         for beam in &scan.returns {
-            let stamp = scan.stamp + beam.offset;
-            // The estimate does not cover the start and the end of the recording, and gaps.
-            let Some(map_from_head) = self.cursor.at(stamp) else { continue };
-            pending.push(self.project(&map_from_head, beam, stamp)?);
+            pending.extend(self.project(beam, scan.stamp + beam.offset, truth.as_deref_mut())?);
         }
         let decided = match &mut self.filter {
             Some(filter) => filter.push(pending),
             None => pending.into_iter().map(|(_, pending)| (pending, ReturnClass::Static)).collect(),
         };
-        self.settle(decided)
+        Ok(self.settle(decided)?)
+    }
+}
+
+impl CloudRegistration<'_> {
+    /// Writes the remaining points and completes the files.
+    pub(super) fn finish(mut self) -> Result<RegisteredCloud, RunError> {
+        let filtered = self.filter.is_some();
+        if let Some(filter) = self.filter.take() {
+            self.settle(filter.finish())?;
+        }
+        self.result.finish()?;
+        self.files.finish()?;
+        let Self { class_counts, sample, page_points, .. } = self;
+        Ok(RegisteredCloud { class_counts, filtered, sample, page_points })
     }
 
     fn project(
         &mut self,
-        map_from_head: &Pose,
         beam: &LidarReturn,
         stamp: Stamp,
-    ) -> Result<(ProjectedReturn, Pending), RecordingError> {
+        truth: Option<&mut TruthCursor>,
+    ) -> Result<Option<(ProjectedReturn, Pending)>, RecordingError> {
+        let Some((map_from_head, in_map)) = self.estimate.project(beam, stamp) else { return Ok(None) };
         let index = self.projected;
         self.projected += 1;
         let point_in_laser: Vector = beam.point_in_laser.cast();
-        let in_map = self.corrected.beam(map_from_head, &point_in_laser);
         let arm = in_map.point - map_from_head.translation.vector;
         let range_sigma_m = self.noise.sigma_m(point_in_laser.norm());
         let error_m = self.covariance_at(stamp).map_or(f64::NAN, |c| point_sigma_m(range_sigma_m, c, &arm)) as f32;
         let point = CloudPoint { point_in_map: in_map.point.cast(), intensity: beam.intensity, stamp, error_m };
         let mut sampled = None;
         if self.sampled.keeps(index) {
-            let state = self.truth.as_mut().map(|truth| truth.at(stamp)).transpose()?.flatten();
+            let state = truth.map(|truth| truth.at(stamp)).transpose()?.flatten();
             let by_truth = state.map(|state| (self.calibrated.beam(&state.world_from_head, &point_in_laser), state));
             sampled = Some(Box::new((in_map, by_truth)));
         }
         let hit = ProjectedReturn { stamp, point_in_map: in_map.point, origin_in_map: in_map.origin };
         let (displayed, on_page) = (self.displayed.keeps(index), self.on_page.keeps(index));
-        Ok((hit, Pending { point, displayed, on_page, sampled }))
+        Ok(Some((hit, Pending { point, displayed, on_page, sampled })))
     }
 
     /// The last covariance at or before `stamp`, or the first one if there is none.
@@ -280,45 +203,19 @@ impl BeamProjection<'_, '_, '_, '_> {
         self.covariances.first().map(|(_, covariance)| covariance)
     }
 
-    /// Counts the decisions, writes the accepted points and returns those for viewers.
-    fn settle(&mut self, decided: Vec<(Pending, ReturnClass)>) -> Result<Vec<CloudPoint>, RecordingError> {
-        let mut displayed = Vec::new();
+    /// Counts the decisions and writes the accepted points.
+    fn settle(&mut self, decided: Vec<(Pending, ReturnClass)>) -> Result<(), RecordingError> {
         for (pending, class) in decided {
             self.class_counts.count(class);
             self.sample.extend(pending.sampled.map(|pair| SampledBeam { in_map: pair.0, by_truth: pair.1, class }));
             if class == ReturnClass::Static {
                 self.files.point(&pending.point)?;
                 self.page_points.extend(pending.on_page.then_some(pending.point));
-                displayed.extend(pending.displayed.then_some(pending.point));
+                if pending.displayed {
+                    self.result.point(pending.point)?;
+                }
             }
         }
-        Ok(displayed)
-    }
-}
-
-/// Extrinsics and range correction of the lidar.
-pub(super) struct LidarModel {
-    head_from_laser: Pose,
-    /// Added to each range, m.
-    range_m: f64,
-}
-
-impl LidarModel {
-    /// The lidar as calibrated, for projection by the truth.
-    pub(super) fn calibrated(calibration: &Calibration) -> Self {
-        Self { head_from_laser: calibration.head_from_laser, range_m: 0.0 }
-    }
-
-    /// The lidar with the estimated correction, for projection by the estimate.
-    pub(super) fn corrected(calibration: &Calibration, lidar: &LidarCorrection) -> Self {
-        Self { head_from_laser: calibration.head_from_corrected_laser(lidar), range_m: lidar.range_m }
-    }
-
-    /// Projects the beam that measured `point_in_laser` from the head pose `frame_from_head`.
-    pub(super) fn beam(&self, frame_from_head: &Pose, point_in_laser: &Vector) -> ProjectedBeam {
-        let frame_from_laser = frame_from_head * self.head_from_laser;
-        let origin = frame_from_laser.translation.vector;
-        let scale = 1.0 + self.range_m / point_in_laser.norm();
-        ProjectedBeam { point: frame_from_laser.rotation * point_in_laser * scale + origin, origin }
+        Ok(())
     }
 }

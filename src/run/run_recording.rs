@@ -2,7 +2,6 @@
 
 use super::calibration::calibration;
 use super::loops::{LoopInputs, Loops};
-use super::sampled_cloud::EstimatedRecording;
 use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError, RunInputs};
 use std::fs::File;
@@ -11,9 +10,9 @@ use zsim_recording::{Reader, Selection, TopicPreference};
 
 /// A recording of a run, read by one thread.
 pub(super) struct RunRecording {
-    reader: Reader,
-    selection: Selection,
-    calibration: Calibration,
+    pub reader: Reader,
+    pub selection: Selection,
+    pub calibration: Calibration,
 }
 
 impl RunRecording {
@@ -51,18 +50,5 @@ impl RunRecording {
             expected_s: None,
         };
         loops.run(None, watch)
-    }
-
-    /// The recording with the best estimate.
-    pub(super) fn with<'a>(&'a self, loops: &'a Loops) -> EstimatedRecording<'a> {
-        let best = loops.best();
-        EstimatedRecording {
-            reader: &self.reader,
-            selection: &self.selection,
-            calibration: &self.calibration,
-            map_from_head: best.map_from_head,
-            lidar: best.lidar,
-            returns: loops.open.returns,
-        }
     }
 }

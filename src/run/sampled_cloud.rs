@@ -1,67 +1,72 @@
 //! A sample of the cloud of a simulated recording, projected by an estimate and by the truth.
 
+use super::RunError;
+use super::beams::{BeamReader, EstimatedBeams, LidarModel, ProjectedBeam, read_beams};
 use super::cloud::Surroundings;
-use super::register::{LidarModel, MAX_POSE_GAP_S, ProjectedBeam};
+use super::loops::Loops;
+use super::run_recording::RunRecording;
 use super::truth_cursor::TruthCursor;
-use super::{ProgressMonitor, RunError};
-use zsim_base::geometry::{SmoothCursor, Trajectory, Vector};
-use zsim_base::measurement::{Calibration, LidarCorrection, Measurement};
+use zsim_base::measurement::LidarScan;
 use zsim_base::parallel::Stopped;
-use zsim_base::time::Span;
 use zsim_evaluation::Thinning;
-use zsim_recording::{Reader, Selection};
-
-/// A recording with its estimate.
-pub(super) struct EstimatedRecording<'a> {
-    pub reader: &'a Reader,
-    pub selection: &'a Selection,
-    pub calibration: &'a Calibration,
-    pub map_from_head: &'a Trajectory,
-    /// Estimated correction of the lidar calibration.
-    pub lidar: &'a LidarCorrection,
-    /// Number of returns in the recording.
-    pub returns: usize,
-}
 
 /// A beam projected by the estimate, in the map frame, and by the truth, in the world frame.
 pub(super) type BeamPair = (ProjectedBeam, ProjectedBeam);
 
-impl EstimatedRecording<'_> {
-    /// About `limit` beams, evenly over the recording, of those that end on static surfaces.
+impl RunRecording {
+    /// About `limit` beams of the best estimate, evenly over the recording, of those that end on static surfaces.
     ///
     /// # Errors
-    /// If the recording cannot be read, or if the run is stopped.
+    /// If the recording cannot be read, or if `check` fails.
     pub(super) fn static_beams(
         &self,
+        loops: &Loops,
         surroundings: Surroundings,
         limit: usize,
-        watch: &ProgressMonitor,
+        check: impl Fn() -> Result<(), Stopped>,
     ) -> Result<Vec<BeamPair>, RunError> {
-        let calibrated = LidarModel::calibrated(self.calibration);
-        let corrected = LidarModel::corrected(self.calibration, self.lidar);
-        let mut estimate = SmoothCursor::with_max_gap(self.map_from_head, Span::from_seconds(MAX_POSE_GAP_S));
-        let mut truth = TruthCursor::new(self.reader.truth());
-        let sampled = Thinning::to_at_most(limit, self.returns);
-        let (mut index, mut beams) = (0, Vec::new());
-        for measurement in self.reader.measurements(self.selection) {
-            let Measurement::Lidar(scan) = measurement? else { continue };
-            if watch.is_stopped() {
-                return Err(Stopped.into());
+        let best = loops.best();
+        let mut sample = StaticSample {
+            estimate: EstimatedBeams::new(best.map_from_head, &self.calibration, best.lidar),
+            calibrated: LidarModel::calibrated(&self.calibration),
+            surroundings,
+            sampled: Thinning::to_at_most(limit, loops.open.returns),
+            read: 0,
+            beams: Vec::new(),
+        };
+        read_beams((&self.reader, &self.selection), true, &mut [&mut sample], &mut |_| check())?;
+        Ok(sample.beams)
+    }
+}
+
+/// Gathers beams on static surfaces.
+struct StaticSample<'a> {
+    estimate: EstimatedBeams<'a>,
+    calibrated: LidarModel,
+    surroundings: Surroundings<'a>,
+    sampled: Thinning,
+    /// Number of returns that were read.
+    read: usize,
+    beams: Vec<BeamPair>,
+}
+
+impl BeamReader for StaticSample<'_> {
+    fn scan(&mut self, scan: &LidarScan, truth: Option<&mut TruthCursor>) -> Result<(), RunError> {
+        let Some(truth) = truth else { return Ok(()) };
+        for beam in &scan.returns {
+            self.read += 1;
+            if !self.sampled.keeps(self.read) {
+                continue;
             }
-            for beam in &scan.returns {
-                index += 1;
-                if !sampled.keeps(index) {
-                    continue;
-                }
-                let stamp = scan.stamp + beam.offset;
-                let (Some(map_from_head), Some(state)) = (estimate.at(stamp), truth.at(stamp)?) else { continue };
-                let point_in_laser: Vector = beam.point_in_laser.cast();
-                let by_truth = calibrated.beam(&state.world_from_head, &point_in_laser);
-                if surroundings.hits_static_surface(&by_truth.point, &state) {
-                    beams.push((corrected.beam(&map_from_head, &point_in_laser), by_truth));
-                }
+            let stamp = scan.stamp + beam.offset;
+            let (Some((_, in_map)), Some(state)) = (self.estimate.project(beam, stamp), truth.at(stamp)?) else {
+                continue;
+            };
+            let by_truth = self.calibrated.beam(&state.world_from_head, &beam.point_in_laser.cast());
+            if self.surroundings.hits_static_surface(&by_truth.point, &state) {
+                self.beams.push((in_map, by_truth));
             }
         }
-        Ok(beams)
+        Ok(())
     }
 }

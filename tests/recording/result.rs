@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use zsim::geometry::{Pose, Trajectory};
-use zsim::recording::{CloudPoint, write_result};
+use zsim::recording::{CloudPoint, ResultWriter};
 use zsim::time::Stamp;
 
 #[test]
@@ -18,7 +18,9 @@ fn a_result_has_path_transform_pose_and_all_points_in_time_order() {
     });
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("result.mcap");
-    write_result(&path, "head", &trajectory, &[], points).unwrap();
+    let mut result = ResultWriter::create(&path, "head", &trajectory, &[]).unwrap();
+    points.for_each(|point| result.point(point).unwrap());
+    result.finish().unwrap();
 
     let bytes = std::fs::read(path).unwrap();
     let mut counts = BTreeMap::new();

@@ -2,14 +2,15 @@
 
 use super::cross_section::CrossSection;
 use crate::RunError;
+use crate::beams::{BeamReader, read_beams};
 use crate::cloud::Surroundings;
 use crate::true_clock::TrueClock;
 use crate::truth_cursor::TruthCursor;
 use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use zsim_base::geometry::{Pose, Trajectory, Vector};
-use zsim_base::measurement::{Calibration, LidarScan, Measurement};
-use zsim_base::parallel::Stopped;
+use zsim_base::measurement::{Calibration, LidarScan};
+use zsim_base::parallel::check;
 use zsim_base::time::{Span, Stamp};
 use zsim_evaluation::Thinning;
 use zsim_recording::{Reader, Selection};
@@ -85,7 +86,6 @@ impl Reference {
         let scans = simulation.inputs().duration_s / lidar.period_s();
         let returns = (scans * lidar.beams().len() as f64) as usize;
         let mut sampling = ReturnSampler {
-            truth: TruthCursor::new(reader.truth()),
             surroundings,
             head_from_laser: calibration.head_from_laser,
             section,
@@ -95,14 +95,7 @@ impl Reference {
             evaluated: Vec::new(),
             shown: Vec::new(),
         };
-        for measurement in reader.measurements(selection) {
-            if stop.load(Ordering::Relaxed) {
-                return Err(Stopped.into());
-            }
-            if let Measurement::Lidar(scan) = measurement? {
-                sampling.add_scan(&scan)?;
-            }
-        }
+        read_beams((reader, selection), true, &mut [&mut sampling], &mut |_| check(stop))?;
         let ReturnSampler { scan_stamps, evaluated, shown, .. } = sampling;
         let coordinates: Vec<(f64, f64)> = shown.iter().map(|(_, coordinates)| *coordinates).collect();
         let range_m = densest_range(&coordinates);
@@ -122,7 +115,6 @@ impl Reference {
 
 /// Samples returns scan by scan.
 struct ReturnSampler<'a> {
-    truth: TruthCursor<'a>,
     surroundings: Surroundings<'a>,
     head_from_laser: Pose,
     section: CrossSection,
@@ -134,15 +126,16 @@ struct ReturnSampler<'a> {
     shown: Vec<(SampledReturn, (f64, f64))>,
 }
 
-impl ReturnSampler<'_> {
-    fn add_scan(&mut self, scan: &LidarScan) -> Result<(), RunError> {
+impl BeamReader for ReturnSampler<'_> {
+    fn scan(&mut self, scan: &LidarScan, truth: Option<&mut TruthCursor>) -> Result<(), RunError> {
+        let Some(truth) = truth else { return Ok(()) };
         let number = self.scan_stamps.len();
         self.scan_stamps.push(scan.stamp);
         for hit in &scan.returns {
             let stamp = scan.stamp + hit.offset;
             let index = self.index;
             self.index += 1;
-            let Some(state) = self.truth.at(stamp)? else { continue };
+            let Some(state) = truth.at(stamp)? else { continue };
             let sampled = SampledReturn { scan: number, offset: hit.offset, point_in_laser: hit.point_in_laser.cast() };
             let world_from_laser = state.world_from_head * self.head_from_laser;
             let end = world_from_laser.transform_point(&sampled.point_in_laser.into()).coords;
