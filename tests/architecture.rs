@@ -289,18 +289,42 @@ fn circles(files: &BTreeMap<String, String>) -> Vec<Vec<String>> {
     imports::Modules::of(files).circles()
 }
 
-#[test]
-fn files_do_not_import_each_other_in_a_circle() {
+/// The files of each room by their paths in it.
+fn rooms() -> BTreeMap<String, BTreeMap<String, String>> {
     let mut rooms: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();
     for (path, text) in sources() {
         let room = room_of(&path);
         let file = path.strip_prefix(src().join(&room)).unwrap_or(&path).to_str().unwrap().to_owned();
         rooms.entry(room).or_default().insert(file, text);
     }
+    rooms
+}
+
+#[test]
+fn modules_of_one_parent_do_not_import_each_other_in_a_circle() {
+    let of_room = |(room, files): (String, BTreeMap<String, String>)| -> Vec<String> {
+        let circles = imports::Modules::of(&files).circles_of_siblings();
+        circles.iter().map(|circle| format!("{room}: {}", circle.join(", "))).collect()
+    };
+    let found: Vec<String> = rooms().into_iter().flat_map(of_room).collect();
+    assert!(found.is_empty(), "folders or files that import each other:\n{}", found.join("\n"));
+    let files = [
+        ("a/mod.rs", "mod one;\nmod two;\n"),
+        ("a/one.rs", "use crate::b::B;\n"),
+        ("a/two.rs", "pub struct Two;\n"),
+        ("b.rs", "use crate::a::two::Two;\npub struct B(Two);\n"),
+    ];
+    let files = files.map(|(file, text)| (file.to_owned(), text.to_owned())).into_iter().collect();
+    assert_eq!(circles(&files).len(), 0);
+    assert_eq!(imports::Modules::of(&files).circles_of_siblings(), [["a", "b"]]);
+}
+
+#[test]
+fn files_do_not_import_each_other_in_a_circle() {
     let of_room = |(room, files): (&String, &BTreeMap<String, String>)| -> Vec<String> {
         circles(files).iter().map(|circle| format!("{room}: {}", circle.join(", "))).collect()
     };
-    let found: Vec<String> = rooms.iter().flat_map(of_room).collect();
+    let found: Vec<String> = rooms().iter().flat_map(of_room).collect();
     assert!(
         found.is_empty(),
         "files that import each other; move what they share to a file of its own:\n{}",

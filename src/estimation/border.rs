@@ -3,7 +3,7 @@
 use super::consider::{IMU_OFFSET, IMU_STATES, StartMatrix};
 use super::normal_equations::{Factor, NormalEquations};
 use super::residual::prior::add_border;
-use super::residual::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
+use crate::layout::{ACCEL_BIAS, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, Layout};
 use nalgebra::{SMatrix, SVector};
 use zsim_base::measurement::ImuNoise;
 

@@ -1,13 +1,13 @@
 //! Initial state: attitude, biases, and detection of an initial rest.
 
 use super::coasting::Coasting;
-use super::residual::{
-    ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION,
-    LIDAR_TRANSLATION, RANGE,
-};
 use super::spec::EstimatorSpec;
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
 use super::unknowns::Unknowns;
+use crate::layout::{
+    ACCEL_BIAS, ACCEL_MATRIX, BORDER, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION,
+    LIDAR_TRANSLATION, RANGE,
+};
 use nalgebra::{SMatrix, SVector};
 use zsim_base::geometry::{Pose, Rotation, Vector, gravity_in_world, roll_pitch_yaw};
 use zsim_base::measurement::ImuNoise;

@@ -65,7 +65,7 @@ mod cloud;
 mod coasting;
 mod consider;
 mod dead_reckoning;
-mod defaults;
+mod displacement;
 mod error;
 mod estimator;
 mod gaps;
@@ -74,6 +74,7 @@ mod inertial;
 mod initial;
 mod intake;
 mod integrity;
+mod layout;
 mod local_map;
 mod localisation;
 mod map;
@@ -91,7 +92,6 @@ mod stamps;
 mod standstill;
 mod strapdown;
 mod surfel;
-mod surfel_spec;
 mod timing;
 mod unknowns;
 mod views;
@@ -106,11 +106,10 @@ pub use integrity::{Cause, Evidence, Finding, Status, bound_factors, covariance_
 pub use map::{LocalisedPose, locate_map, map_of, merge_maps};
 pub use observed::ObservedSurfels;
 pub use output::{ALIGNMENT_S, EstimatedPose, MatrixEntry, OpenLoop, TURN_LEVER_M, WindowReport};
-pub use registration::{
-    ClosedLoop, LoopReport, PlacesSpec, RegistrationInput, RegistrationReport, RegistrationSpec, register,
-};
+pub use registration::{ClosedLoop, LoopReport, RegistrationInput, RegistrationReport, register};
 pub use spec::{
-    ClockSpec, EstimatorSpec, Formulation, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec, load,
+    ClockSpec, EstimatorSpec, Formulation, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec,
+    SurfelSpec, ViewSpec, load,
 };
 pub use stamps::smoothed_stamps;
 pub use timing::{PartTime, Timing};

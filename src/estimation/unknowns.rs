@@ -1,11 +1,11 @@
 //! The unknowns of the window that all times share: biases, gravity, clock and calibration.
 
 use super::clock::Clock;
-use super::residual::{
+use super::strapdown::{Biases, ImuScaleMisalignment};
+use crate::layout::{
     ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, LIDAR_ROTATION, LIDAR_TRANSLATION,
     RANGE,
 };
-use super::strapdown::{Biases, ImuScaleMisalignment};
 use zsim_base::geometry::{Matrix, Rotation, Vector, gravity_in_world};
 use zsim_base::measurement::LidarCorrection;
 

@@ -3,6 +3,7 @@
 //! A [`sweep`] varies parameters of a run and reports their effects; [`latency`] measures the effect of timing errors;
 //! [`design`] searches for a spring; [`reproduction`] repeats the experiments of the paper.
 
+mod bootstrap;
 mod cma_es;
 pub mod design;
 mod error;
@@ -10,4 +11,5 @@ pub mod latency;
 pub mod reproduction;
 pub mod sweep;
 
+pub use bootstrap::ConfidenceInterval;
 pub use error::StudyError;

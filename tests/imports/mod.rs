@@ -35,15 +35,21 @@ impl Modules {
 
     /// Files that import each other in a circle: one sorted list for each group of files that reach each other.
     pub fn circles(&self) -> Vec<Vec<String>> {
-        let imports = self.imports();
-        let reach: BTreeMap<&str, BTreeSet<&str>> =
-            imports.keys().map(|f| (f.as_str(), reached(&imports, f))).collect();
-        let among = |f: &str| -> Vec<String> {
-            let mutual = reach[f].iter().filter(|g| reach.get(*g).is_some_and(|back| back.contains(f)));
-            mutual.map(|g| (*g).to_owned()).collect()
-        };
-        let circles: BTreeSet<Vec<String>> = imports.keys().map(|f| among(f)).filter(|c| !c.is_empty()).collect();
-        circles.into_iter().collect()
+        circles_among(&self.imports())
+    }
+
+    /// Modules of the same parent, files or folders, that import each other in a circle.
+    pub fn circles_of_siblings(&self) -> Vec<Vec<String>> {
+        let mut siblings: BTreeMap<String, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
+        for (file, imported) in self.imports() {
+            for other in imported {
+                let Some((parent, a, b)) = siblings_above(&file, &other) else { continue };
+                let among = siblings.entry(parent).or_default();
+                among.entry(b.clone()).or_default();
+                among.entry(a).or_default().insert(b);
+            }
+        }
+        siblings.values().flat_map(circles_among).collect()
     }
 
     /// The files that each file imports.
@@ -117,6 +123,27 @@ fn module_path(file: &str) -> ModulePath {
 
 fn child(path: &ModulePath, name: &str) -> ModulePath {
     path.iter().cloned().chain([name.to_owned()]).collect()
+}
+
+/// Groups of names that reach each other, each as a sorted list.
+fn circles_among(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<Vec<String>> {
+    let reach: BTreeMap<&str, BTreeSet<&str>> = imports.keys().map(|f| (f.as_str(), reached(imports, f))).collect();
+    let among = |f: &str| -> Vec<String> {
+        let mutual = reach[f].iter().filter(|g| reach.get(*g).is_some_and(|back| back.contains(f)));
+        mutual.map(|g| (*g).to_owned()).collect()
+    };
+    let circles: BTreeSet<Vec<String>> = imports.keys().map(|f| among(f)).filter(|c| !c.is_empty()).collect();
+    circles.into_iter().collect()
+}
+
+/// The innermost module that contains both files, and the paths of its two modules that contain one each.
+///
+/// `None` for a module and its parent, which may use each other's names.
+fn siblings_above(file: &str, other: &str) -> Option<(String, String, String)> {
+    let (a, b) = (module_path(file), module_path(other));
+    let shared = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
+    let through = |path: &ModulePath| path.get(..=shared).map(|path| path.join("/"));
+    Some((a[..shared].join("/"), through(&a)?, through(&b)?))
 }
 
 /// The files that `from` imports, directly or over other files.

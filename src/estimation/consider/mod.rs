@@ -17,8 +17,8 @@ mod alignment;
 mod gauge;
 
 use self::gauge::{Gauge, Mark};
-use super::residual::GYRO_BIAS;
 use super::views::{MAP, ViewUpdate};
+use crate::layout::GYRO_BIAS;
 use nalgebra::{Matrix6, SMatrix};
 use zsim_base::geometry::{Vector, skew};
 

@@ -13,8 +13,8 @@
 //! de_r = dr_b - dr_a       de_t = dt_b - dt_a + v x (dr_a + dr_b) / 2       de_l = [dr]_(x, y)
 //! ```
 
-use super::RegistrationSpec;
 use super::equations::{Equations, PairTerm, UnaryTerm};
+use crate::RegistrationSpec;
 use crate::nominal::Correction;
 use crate::observed::MotionByViews;
 use crate::spline::Basis;

@@ -5,10 +5,10 @@
 //! summed by the time bins (half knot intervals) of both surfels, with derivatives at the middle of the bins, then distributed
 //! to the knots. Residuals are exact; derivatives are evaluated at most a quarter of a knot interval off.
 
-use super::RegistrationSpec;
 use super::equations::{Equations, PairTerm, SharedTerm, UnaryTerm};
 use super::neighbours::ActiveNeighbours;
 use super::scene::Scene;
+use crate::RegistrationSpec;
 use crate::matching::Matcher;
 use crate::residual::matched::MIN_SIGNIFICANT_TILT;
 use crate::residual::matched::Plane;

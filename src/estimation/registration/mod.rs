@@ -34,20 +34,19 @@ mod places;
 mod reduction;
 mod scene;
 mod sensed_motion;
-mod spec;
 mod submaps;
 #[cfg(test)]
 mod tests;
 mod trajectory_difference;
 mod uncertainty;
 
-pub use places::{LoopReport, PlacesSpec};
-pub use spec::RegistrationSpec;
+pub use places::LoopReport;
 
+use super::RegistrationSpec;
+use super::displacement::Displacement;
 use super::gaps::{Gaps, restored};
 use super::matching::Matcher;
 use super::observed::ObservedSurfels;
-use super::window::Displacement;
 use super::{EstimationError, EstimatorSpec};
 use corrected_trajectory::CorrectedTrajectory;
 use equations::Equations;

@@ -3,7 +3,8 @@
 use super::corrected_trajectory::CorrectedTrajectory;
 use super::equations::Shared;
 use super::lidar_model::{LidarModel, LidarRay, rotate_patch};
-use super::{RegistrationSpec, submaps};
+use super::submaps;
+use crate::RegistrationSpec;
 use crate::nominal::Correction;
 use crate::observed::ObservedSurfels;
 use crate::spline::Basis;

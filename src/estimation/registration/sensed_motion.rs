@@ -1,6 +1,6 @@
 //! The motion that the sensors measured: the open loop without the influence of its fixed views.
 
-use super::RegistrationSpec;
+use crate::RegistrationSpec;
 use crate::observed::MotionByViews;
 use nalgebra::{Matrix6, Vector6};
 use zsim_base::geometry::{Pose, Rotation, Trajectory, TrajectoryError, Vector};

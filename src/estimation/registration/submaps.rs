@@ -5,7 +5,7 @@
 //! with the references that observe the same cells. The number of references does not grow with the time spent in one area:
 //! the other submaps are linked to references and to their neighbours in time only, and the equations stay sparse.
 
-use super::RegistrationSpec;
+use crate::RegistrationSpec;
 use crate::surfel::Patch;
 use crate::views::cells_of;
 use rayon::prelude::*;

@@ -8,7 +8,7 @@
 //! `b` and `M` only by the part that the spline follows.
 
 use super::nodes::Nodes;
-use super::{ACCEL_BIAS, ACCEL_MATRIX, GYRO_BIAS, GYRO_MATRIX, Layout};
+use crate::layout::{ACCEL_BIAS, ACCEL_MATRIX, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::nominal::Correction;
 use crate::normal_equations::{Factor, NormalEquations};
 use crate::spline::Basis;

@@ -2,7 +2,7 @@
 
 use super::fast_motion::ByErrors;
 use super::rows::{KNOTS, ResidualRow, ResidualSums};
-use super::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
+use crate::layout::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::normal_equations::NormalEquations;
 use crate::spline::Basis;
 use crate::strapdown::{Biases, Interval, State};

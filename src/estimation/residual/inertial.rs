@@ -21,11 +21,11 @@
 //! The equations use residuals summed over a knot spacing ([`add_inertial`]), which is the resolution at which the
 //! correction can follow the effect of a bias.
 
-use super::Layout;
 use super::fast_motion::FastMotion;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial};
 use super::nodes::Nodes;
 use super::rows::ResidualSums;
+use crate::layout::Layout;
 use crate::normal_equations::NormalEquations;
 use crate::strapdown::{Biases, Interval};
 use zsim_base::geometry::Vector;
@@ -127,10 +127,10 @@ pub(super) fn with_step_margin(interval: &Interval) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::{ACCEL_BIAS, ACCEL_MATRIX, BORDER, GRAVITY, GYRO_BIAS, GYRO_MATRIX};
     use crate::nominal::Correction;
     use crate::normal_equations::Factor;
     use crate::residual::prior::Start;
-    use crate::residual::{ACCEL_BIAS, ACCEL_MATRIX, BORDER, GRAVITY, GYRO_BIAS, GYRO_MATRIX};
     use crate::spline::Basis;
     use crate::strapdown::ImuScaleMisalignment;
     use crate::strapdown::State;

@@ -10,7 +10,7 @@
 //! [`COMMON_WITHOUT_EXTRINSICS`] if the lidar extrinsics are not estimated.
 
 use super::knot_span::{SPAN_UNKNOWNS, add_scaled, over_knots};
-use super::{CLOCK, Layout, RANGE};
+use crate::layout::{CLOCK, Layout, RANGE};
 use crate::spline::Basis;
 use crate::surfel::{Patch, PlacedSurfel, Sighting};
 use zsim_base::geometry::{Matrix, Vector};
@@ -137,8 +137,8 @@ pub(crate) fn add_scaled_row(
 #[cfg(test)]
 mod tests {
     use super::super::sums::{Coupling, SpanSums, SurfelSums};
-    use super::super::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION};
     use super::*;
+    use crate::layout::{BORDER, LIDAR_ROTATION, LIDAR_TRANSLATION};
     use crate::nominal::Correction;
     use crate::normal_equations::NormalEquations;
     use crate::spline::Basis;

@@ -24,11 +24,11 @@
 //!
 //! Every sample has its full weight.
 
-use super::Layout;
 use super::imu_residual::{AccelResidual, GyroResidual, Inertial, ResidualSum, offset, span_of};
 use super::inertial::{near_steps, with_step_margin};
 use super::nodes::Nodes;
 use super::rows::{KNOTS, ResidualSums};
+use crate::layout::Layout;
 use crate::normal_equations::NormalEquations;
 use crate::spline::Basis;
 use crate::strapdown::{Biases, Interval};
@@ -122,8 +122,8 @@ fn add_basis<T>(knots: &mut [T; KNOTS], basis: &Basis, first: i64, mut add: impl
 mod tests {
     use super::*;
     use crate::imu_signal::ImuSignal;
+    use crate::layout::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
     use crate::nominal::Correction;
-    use crate::residual::{ACCEL_BIAS, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS};
     use crate::strapdown::State;
     use approx::assert_relative_eq;
     use nalgebra::{DMatrix, DVector};

@@ -1,6 +1,6 @@
 //! Priors of the window: the start state and the border.
 
-use super::{BORDER, LIDAR_ROTATION, Layout};
+use crate::layout::{BORDER, LIDAR_ROTATION, Layout};
 use crate::normal_equations::NormalEquations;
 use crate::spline::Basis;
 use nalgebra::{Matrix6, SMatrix, SVector};

@@ -2,7 +2,7 @@
 //!
 //! All samples of a knot span depend on the same unknowns, so their products are summed in one small dense block.
 
-use super::{GYRO_MATRIX, Layout, RANGE};
+use crate::layout::{GYRO_MATRIX, Layout, RANGE};
 use crate::normal_equations::NormalEquations;
 use pulp::Arch;
 

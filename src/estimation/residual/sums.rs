@@ -5,7 +5,7 @@
 
 use super::knot_span::{SPAN_UNKNOWNS, add_over_knots, add_scaled, over_knots};
 use super::matched::SurfelJacobian;
-use super::{CLOCK, Layout};
+use crate::layout::{CLOCK, Layout};
 use crate::normal_equations::NormalEquations;
 use crate::spline::Basis;
 use crate::surfel::PlacedSurfel;

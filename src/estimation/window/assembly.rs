@@ -1,11 +1,13 @@
 //! Assembly and solution of the window's normal equations.
 
 use super::Window;
-use super::equations::{Displacement, WeightedMatches, Workspace};
+use super::equations::{WeightedMatches, Workspace};
 use super::linearised::Linearised;
+use crate::displacement::Displacement;
+use crate::layout::Layout;
 use crate::nominal::Correction;
 use crate::residual::inertial::add_inertial;
-use crate::residual::{FastMotion, Layout, Nodes, paper, prior};
+use crate::residual::{FastMotion, Nodes, paper, prior};
 use crate::spec::Formulation;
 use crate::spline::Basis;
 use crate::timing::{Stopwatch, Timing};

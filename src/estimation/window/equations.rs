@@ -1,16 +1,16 @@
 //! Parts of the window's normal equations: buffers, the robust kernel, and the matches with robust weights.
 
 use super::correspondence::{Counterpart, Match, Matches};
+use crate::layout::Layout;
 use crate::normal_equations::{Factor, NormalEquations};
+use crate::residual::FastMotion;
 use crate::residual::matched::{COMMON, COMMON_WITHOUT_EXTRINSICS, Plane, SurfelJacobian};
 use crate::residual::sums::{Coupling, SpanSums, SurfelSums};
-use crate::residual::{FastMotion, Layout};
 use crate::spec::SolveSpec;
 use crate::spline::Basis;
 use crate::surfel::PlacedSurfel;
 use pulp::Arch;
 use rayon::prelude::*;
-use zsim_base::geometry::Vector;
 
 /// Buffers that all solves of a window share.
 #[derive(Debug)]
@@ -48,32 +48,6 @@ impl Robust {
     pub fn weight(&self, plane: &Plane, residual_m: f64) -> f64 {
         let normalised2 = residual_m * residual_m / plane.variance;
         self.weight / (plane.variance * (1.0 + normalised2 / (self.threshold * self.threshold)))
-    }
-}
-
-/// The largest displacement of the trajectory by a correction.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Displacement {
-    /// Translation, m.
-    pub translation_m: f64,
-    /// Rotation, rad.
-    pub rotation_rad: f64,
-}
-
-impl Displacement {
-    /// The maximum over corrections, each rotation and translation.
-    pub fn max_of(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
-        // A NaN must not count as small.
-        let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-        corrections.fold(Self { translation_m: 0.0, rotation_rad: 0.0 }, |largest, (rotation, translation)| Self {
-            translation_m: larger(largest.translation_m, translation.norm()),
-            rotation_rad: larger(largest.rotation_rad, rotation.norm()),
-        })
-    }
-
-    /// The larger of rotation (rad) and translation (m).
-    pub fn max(self) -> f64 {
-        self.translation_m.max(self.rotation_rad)
     }
 }
 

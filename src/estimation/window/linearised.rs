@@ -2,7 +2,7 @@
 
 use super::correspondence::Matches;
 use super::equations::Robust;
-use crate::residual::Layout;
+use crate::layout::Layout;
 use crate::surfel::PlacedSurfel;
 
 /// The last linearisation of a solved window; the workspace still has the equations and the factor of it.

@@ -11,7 +11,6 @@ mod search;
 mod solve;
 mod uncertainty;
 
-pub(super) use equations::Displacement;
 pub(super) use linearised::Linearised;
 pub(super) use local_motion::LocalMotion;
 pub(super) use solve::WindowSolution;

@@ -1,7 +1,7 @@
 //! Figures: sections through the map as in the paper's figure 4, and error curves.
 
 use super::{LatencyResult, LatencyRun};
-use crate::sweep::ConfidenceInterval;
+use crate::bootstrap::ConfidenceInterval;
 use zsim_report::plot::{BandPoint, Chart, Colour, Figure, Mark, Series, SignedDot, SignedDots};
 use zsim_run::timing::{ClockState, Disturbance};
 

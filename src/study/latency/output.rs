@@ -1,7 +1,7 @@
 //! Tables of a latency study.
 
 use super::{LatencyResult, LatencyRun};
-use crate::sweep::ConfidenceInterval;
+use crate::bootstrap::ConfidenceInterval;
 use std::fmt::Write;
 use zsim_run::timing::{ClockState, Disturbance};
 

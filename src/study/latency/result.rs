@@ -1,6 +1,6 @@
 //! Result of a latency study.
 
-use crate::sweep::{ConfidenceInterval, Resampling};
+use crate::bootstrap::{ConfidenceInterval, Resampling};
 use serde::Serialize;
 use zsim_run::RunInputs;
 use zsim_run::timing::{Block, ClockState, Disturbance, MapErrors, Section, pooled};

@@ -11,7 +11,6 @@
 
 mod axis;
 mod base_spec;
-mod bootstrap;
 mod check;
 mod design;
 mod effects;
@@ -48,8 +47,6 @@ mod worker;
 
 pub(crate) use base_spec::usual;
 pub use base_spec::{BaseSpec, JourneySpec, LimitSpec, ReferenceSpec};
-pub use bootstrap::ConfidenceInterval;
-pub(super) use bootstrap::Resampling;
 pub use folder::Sweep;
 pub use goal::{Aim, GoalSpec, MeasureLimitSpec};
 pub(super) use identity::ContentHash;

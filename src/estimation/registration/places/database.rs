@@ -1,6 +1,6 @@
 //! Divides the recording into nodes, submaps for place recognition.
 
-use super::PlacesSpec;
+use crate::PlacesSpec;
 use crate::observed::ObservedSurfels;
 use crate::registration::corrected_trajectory::CorrectedTrajectory;
 use crate::registration::submaps::divide;

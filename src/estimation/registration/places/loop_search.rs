@@ -3,7 +3,8 @@
 use super::alignment::{ALIGNED_LEVELS, Alignment, Fit, NodeSurfels, agreement, align};
 use super::database::PlaceDatabase;
 use super::scan_context::{self, Context};
-use super::{LoopReport, MATCHING_REACH, PlacesSpec, RelativePose, correlation};
+use super::{LoopReport, MATCHING_REACH, RelativePose, correlation};
+use crate::PlacesSpec;
 use crate::matching::Matcher;
 use rayon::prelude::*;
 

@@ -19,16 +19,14 @@ mod loop_search;
 mod pose_graph;
 mod relative_pose;
 mod scan_context;
-mod spec;
 
 pub use relative_pose::LoopReport;
 use relative_pose::MATCHING_REACH;
 pub(super) use relative_pose::RelativePose;
-pub use spec::PlacesSpec;
 
-use super::RegistrationSpec;
 use super::corrected_trajectory::CorrectedTrajectory;
 use super::trajectory_difference::largest_difference;
+use crate::RegistrationSpec;
 use crate::matching::Matcher;
 use crate::observed::ObservedSurfels;
 use database::PlaceDatabase;

@@ -1,7 +1,15 @@
-pub use super::surfel_spec::{MatchingSpec, SurfelSpec};
+//! Settings of the estimator.
 
-use super::{EstimationError, RegistrationSpec};
+mod defaults;
+mod places;
+mod registration;
+mod surfel;
+
+use super::EstimationError;
+pub use places::PlacesSpec;
+pub use registration::RegistrationSpec;
 use serde::{Deserialize, Serialize};
+pub use surfel::{MatchingSpec, SurfelSpec};
 use zsim_base::spec::{Kind, SpecError};
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.

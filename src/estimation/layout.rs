@@ -11,7 +11,10 @@ pub(crate) const GYRO_BIAS: usize = 0;
 pub(crate) const ACCEL_BIAS: usize = 3;
 pub(crate) const GRAVITY: usize = 6;
 pub(crate) const CLOCK: usize = 8;
+pub(crate) const CLOCK_RATE: usize = 9;
+pub(crate) const RANGE: usize = 10;
 pub(crate) const LIDAR_ROTATION: usize = 11;
+pub(crate) const LIDAR_TRANSLATION: usize = 14;
 pub(crate) const GYRO_MATRIX: usize = 17;
 pub(crate) const ACCEL_MATRIX: usize = 26;
 

@@ -1,6 +1,6 @@
 use super::PlacesSpec;
 use crate::EstimationError;
-use crate::surfel_spec::{MatchingSpec, SurfelSpec};
+use crate::spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
 
 /// Global registration (loop-closed trajectory) settings.
@@ -116,7 +116,7 @@ impl RegistrationSpec {
     }
 
     /// Matching settings of the registration; the others equal `open_loop`.
-    pub(super) fn matching(&self, open_loop: &MatchingSpec) -> MatchingSpec {
+    pub(crate) fn matching(&self, open_loop: &MatchingSpec) -> MatchingSpec {
         MatchingSpec { max_plane_distance_m: self.max_plane_distance_m, ..open_loop.clone() }
     }
 

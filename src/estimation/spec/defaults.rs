@@ -1,11 +1,10 @@
 //! Default settings: those of `specs/estimators/default.ron`, which is in the binary.
 
-use crate::RegistrationSpec;
-use crate::registration::PlacesSpec;
-use crate::spec::{
-    ClockSpec, EstimatorSpec, ExtrinsicsSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec,
+use super::surfel::FineSurfelSpec;
+use super::{
+    ClockSpec, EstimatorSpec, ExtrinsicsSpec, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec,
+    SurfelSpec, ViewSpec,
 };
-use crate::surfel_spec::FineSurfelSpec;
 use std::sync::LazyLock;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, Tree, built_in, parse_over};
 
