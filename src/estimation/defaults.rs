@@ -1,11 +1,11 @@
 //! Default settings: those of `specs/estimators/default.ron`, which is in the binary.
 
-use crate::RegistrationSpec;
 use crate::registration::PlacesSpec;
 use crate::spec::{
     ClockSpec, EstimatorSpec, ExtrinsicsSpec, InertialSpec, MatchingSpec, SolveSpec, SurfelSpec, ViewSpec,
 };
 use crate::surfel_spec::FineSurfelSpec;
+use crate::{EstimationError, RegistrationSpec};
 use std::sync::LazyLock;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, Tree, built_in, parse_over};
 
@@ -34,6 +34,14 @@ impl NamedSpec for EstimatorSpec {
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
         parse_over(source, Some(tree()?))
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match self.check() {
+            Ok(()) => Ok(Vec::new()),
+            Err(EstimationError::Setting { key, message }) => Err(SpecError::about(source, key, message)),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
     }
 }
 

@@ -2,7 +2,7 @@ pub use super::surfel_spec::{MatchingSpec, SurfelSpec};
 
 use super::{EstimationError, RegistrationSpec};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, SpecError};
+use zsim_base::spec::SpecError;
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -184,7 +184,7 @@ pub struct ViewSpec {
 /// # Errors
 /// If the spec does not exist or is invalid.
 pub fn load(name: &str) -> Result<EstimatorSpec, SpecError> {
-    zsim_base::spec::load(Kind::Estimator, name)
+    zsim_base::spec::load(name)
 }
 
 impl EstimatorSpec {
