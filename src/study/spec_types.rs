@@ -1,8 +1,8 @@
 //! The types of the specs of all kinds: this room is the lowest that knows them.
 
 use crate::StudyError;
-use crate::reproduction::ExperimentSpec;
 use crate::design::DesignSpec;
+use crate::reproduction::ExperimentSpec;
 use crate::sweep::SweepSpec;
 use schemars::{Schema, SchemaGenerator, json_schema, schema_for};
 use serde_json::Value;

@@ -90,8 +90,8 @@ impl Plan {
         let design = design.ok_or_else(|| about(format!("more than {MAX_RUNS} runs: reduce levels or samples")))?;
         let hashes = input_hashes(&specs.base, None)?;
         let plan = Self { name: name.to_owned(), spec: spec.clone(), specs: specs.clone(), hashes, axes, design };
-        if plan.points() > MAX_RUNS {
-            return Err(about(format!("{} runs with all seeds: expected at most {MAX_RUNS}", plan.points())).into());
+        if plan.runs() > MAX_RUNS {
+            return Err(about(format!("{} runs with all seeds: expected at most {MAX_RUNS}", plan.runs())).into());
         }
         Ok(plan)
     }
@@ -107,7 +107,7 @@ impl Plan {
     }
 
     /// Number of runs.
-    pub fn points(&self) -> u64 {
+    pub fn runs(&self) -> u64 {
         self.design.count() * self.seeds() as u64
     }
 
