@@ -5,7 +5,7 @@ use super::usage::Usage;
 use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use zsim_base::geometry::{Pose, Rotation, Route, Vector};
+use zsim_base::geometry::{Pose, Rotation, Vector};
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, find};
 use zsim_estimation::{self, EstimatorSpec};
@@ -97,17 +97,9 @@ impl ScenarioArguments {
     /// The input files of a simulation in `scene` that are known by name: specs, and a recorded motion.
     pub(super) fn inputs(&self, scene: &str) -> Vec<PathBuf> {
         let scenario = self.scenario(scene);
-        let names = [
-            (Kind::Scene, Some(&scenario.scene)),
-            (Kind::Head, Some(&scenario.head)),
-            (Kind::Motion, Some(&scenario.motion)),
-            (Kind::Lidar, Some(&scenario.lidar)),
-            (Kind::Imu, Some(&scenario.imu)),
-            (Kind::Imu, scenario.base_imu.as_ref()),
-            (Kind::Clock, Some(&scenario.clock)),
-            (Kind::Faults, scenario.faults.as_ref()),
-        ];
-        let files = names.into_iter().filter_map(|(kind, name)| spec_file(kind, name?));
+        let inputs = zsim_base::spec::to_json(&scenario).unwrap_or_default();
+        let names = inputs.as_object().into_iter().flatten();
+        let files = names.filter_map(|(key, name)| spec_file(Kind::of_input(key)?, name.as_str()?));
         let recorded = zsim_motion::load(&scenario.motion).ok().and_then(|(spec, source)| spec.recorded_file(&source));
         files.chain(recorded).collect()
     }
@@ -226,10 +218,4 @@ pub(super) fn start(text: &str) -> Result<Pose, String> {
     let (x, y, z, yaw_deg) = (x?, y?, z?, quantity::degrees(yaw)?);
     let turn = Rotation::from_axis_angle(&Vector::z_axis(), yaw_deg.to_radians());
     Ok(Pose::from_parts(Vector::new(x, y, z).into(), turn))
-}
-
-/// A way that any motion can follow: round a hall of 20 m by 10 m.
-pub(super) fn any_route() -> Route {
-    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0)];
-    Route { points_in_world: corners.map(|(x, y)| Vector::new(x, y, 0.0)).to_vec(), closed: true }
 }

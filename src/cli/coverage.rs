@@ -1,6 +1,6 @@
 //! `zsim coverage`: the part of the sphere that a lidar on a moving head observes.
 
-use super::arguments::{Global, OutArguments, any_route};
+use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
 use super::{Completion, coverage_text, output, quantity};
 use clap::Args;
@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let imu = Imu::new(&ImuSpec::parse(&imu_source)?, &imu_source)?;
     let (motion, motion_source) = zsim_motion::load(&arguments.motion)?;
     let until_s = arguments.from + arguments.duration;
-    let motion = motion.build(&motion_source, Some(&any_route()), until_s, Seed(arguments.seed))?;
+    let motion = motion.build(&motion_source, Some(&zsim_motion::any_route()), until_s, Seed(arguments.seed))?;
     let plan = CoveragePlan {
         from_s: arguments.from,
         duration_s: arguments.duration,

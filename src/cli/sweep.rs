@@ -146,7 +146,7 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
     check_spec_stays(&arguments.spec, &folder)?;
     let folder = output::folder_to_resume(&folder)?;
     let sweep = plan.write(&folder, arguments.force)?;
-    let figures = json!({ "points": plan.points(), "tasks": sweep.tasks() });
+    let figures = json!({ "points": plan.runs(), "tasks": sweep.jobs() });
     output::print_result(global, &plan_text(&sweep), figures, Some(&folder))?;
     Ok(Completion::Done)
 }
@@ -200,7 +200,7 @@ fn shard(arguments: &RunArguments) -> anyhow::Result<Shard> {
 fn run_task(arguments: &TaskArguments) -> anyhow::Result<Completion> {
     let sweep = Sweep::open(&arguments.folder)?;
     limit_process(sweep.limit())?;
-    sweep.run_task(arguments.task, &|word| {
+    sweep.run_job(arguments.task, &|word| {
         // The supervisor has ended: end this process too.
         if writeln!(std::io::stdout().lock(), "{word}").is_err() {
             std::process::exit(1);

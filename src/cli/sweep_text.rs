@@ -3,7 +3,7 @@ use zsim_study::sweep::{Sweep, SweepStatus};
 
 /// Summary of a plan.
 pub(super) fn plan_text(sweep: &Sweep) -> String {
-    format!("{} runs in {} tasks", sweep.plan().points(), sweep.tasks())
+    format!("{} runs in {} tasks", sweep.plan().runs(), sweep.jobs())
 }
 
 /// Progress of a sweep.

@@ -12,8 +12,8 @@ use super::mounted_spring::MountedSpring;
 use super::spec::{HeadSpec, LinkageSpec};
 use super::statics::NoEquilibrium;
 use zsim_base::geometry::{Kinematics, Pose, gravity_in_world};
-use zsim_base::spec::{Source, SpecError};
-use zsim_elasticity::{ElasticityError, SpringState, stack};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named};
+use zsim_elasticity::{ElasticityError, SpringSpec, SpringState, stack};
 
 /// A head and the linkage that connects it to the base.
 ///
@@ -234,5 +234,31 @@ impl Linkage {
             compliant.add_end_stop(stop, body, source)?;
         }
         Ok(Linkage::Compliant(Box::new(compliant)))
+    }
+}
+
+impl NamedSpec for HeadSpec {
+    const KIND: Kind = Kind::Head;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match HeadModel::new(&self.clone().with_files_of(source), source) {
+            Ok(_) => Ok(Vec::new()),
+            Err(DynamicsError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
+    }
+
+    /// Replaces a spring that is given by name by its description, so that its settings can be varied.
+    fn resolved(self, source: &Source) -> Result<Self, SpecError> {
+        let mut head = self.with_files_of(source);
+        if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
+            *spring = SpringSpec::resolved(spring)?;
+        }
+        Ok(head)
     }
 }

@@ -5,7 +5,7 @@ use super::carrier::CarrierSpec;
 use super::elements::{CableSpec, ElementSpec, SpringMassSpec};
 pub use super::placement::PlacementSpec;
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find, name_from, parse_named};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, find, name_from};
 use zsim_elasticity::SpringSpec;
 
 /// A head, the linkage to the base, and the carrier.
@@ -255,22 +255,4 @@ pub struct HoldSpec {
     /// Damping ratio of that oscillation.
     #[serde(with = "checked::NonNegative")]
     pub damping_ratio: f64,
-}
-
-impl NamedSpec for HeadSpec {
-    const KIND: Kind = Kind::Head;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
-    }
-
-    /// Replaces a spring that is given by name by its description, so that its settings can be varied.
-    fn resolved(self, source: &Source) -> Result<Self, SpecError> {
-        let mut head = self.with_files_of(source);
-        if let LinkageSpec::Spring { spring, .. } = &mut head.linkage {
-            *spring = SpringSpec::resolved(spring)?;
-        }
-        Ok(head)
-    }
 }

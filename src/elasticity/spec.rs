@@ -158,7 +158,7 @@ impl SpringSpec {
     /// When there is no spring of that name, or the file is invalid or names another spring.
     pub fn resolved(&self) -> Result<SpringSpec, SpecError> {
         let SpringSpec::Named(name) = self else { return Ok(self.clone()) };
-        match zsim_base::spec::load(Kind::Spring, name)? {
+        match zsim_base::spec::load(name)? {
             SpringSpec::Named(other) => {
                 let message = format!("the spring names another spring, \"{other}\"; it must be a coil or a stiffness");
                 Err(SpecError::plain(name, message))
@@ -249,5 +249,13 @@ impl NamedSpec for SpringSpec {
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
         parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match self.design() {
+            Ok(_) => Ok(Vec::new()),
+            Err(ElasticityError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
     }
 }

@@ -39,7 +39,7 @@ pub use legged::{LeggedSpec, StrideSpec};
 pub use marine::{HullSpec, MarineSpec, SeaSpec};
 pub use replay::{PosesSpec, ReplaySpec};
 pub use shaker::{Axis, DriveSpec, Level, Phases, ShakerSpec, SignalSpec};
-pub use spec::{MotionSpec, load};
+pub use spec::{MotionSpec, any_route, load};
 pub use stand::StandSpec;
 pub use stops::StopsSpec;
 pub use uav::{GustSpec, RotorSpec, UavSpec};

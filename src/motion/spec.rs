@@ -10,7 +10,7 @@ use super::vehicle::{Vehicle, VehicleSpec};
 use super::{BaseMotion, MAX_DURATION_S, MotionError};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use zsim_base::geometry::Route;
+use zsim_base::geometry::{Route, Vector};
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find, parse_named};
 
@@ -46,6 +46,12 @@ pub enum MotionSpec {
 pub fn load(name: &str) -> Result<(MotionSpec, Source), SpecError> {
     let source = find(Kind::Motion, name)?;
     Ok((MotionSpec::parse(&source)?, source))
+}
+
+/// A route that any motion can follow: around a hall of 20 m by 10 m.
+pub fn any_route() -> Route {
+    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 10.0), (0.0, 10.0)];
+    Route { points_in_world: corners.map(|(x, y)| Vector::new(x, y, 0.0)).to_vec(), closed: true }
 }
 
 impl MotionSpec {
@@ -95,5 +101,13 @@ impl NamedSpec for MotionSpec {
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
         parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match self.build(source, Some(&any_route()), 120.0, Seed(1)) {
+            Ok(_) => Ok(Vec::new()),
+            Err(MotionError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
     }
 }

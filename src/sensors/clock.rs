@@ -169,6 +169,10 @@ impl NamedSpec for ClocksSpec {
     fn parse(source: &Source) -> Result<Self, SpecError> {
         parse_named(source)
     }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        Clocks::new(self, source, Stamp::from_nanos(0)).map(|_| Vec::new())
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub mod design;
 mod error;
 pub mod latency;
 pub mod reproduction;
+pub mod spec_types;
 pub mod sweep;
 
 pub use bootstrap::ConfidenceInterval;

@@ -3,7 +3,7 @@
 use super::build::build;
 use super::{ItemSpec, SceneSpec, ShapeSpec, WorldError};
 use std::collections::BTreeMap;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from, parse_named};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from};
 
 /// Maximum depth of included scenes.
 const MAX_INCLUDE_DEPTH: usize = 16;
@@ -90,21 +90,4 @@ fn merge_named<T>(
         first.insert(name, value);
     }
     Ok(())
-}
-
-impl NamedSpec for SceneSpec {
-    const KIND: Kind = Kind::Scene;
-    type Error = WorldError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        let scene: Self = parse_named(source)?;
-        if scene.name.is_empty() {
-            return Ok(Self { name: source.stem(), ..scene });
-        }
-        Ok(scene)
-    }
-
-    fn resolved(self, source: &Source) -> Result<Self, WorldError> {
-        self.with_includes(source)
-    }
 }

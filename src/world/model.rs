@@ -9,7 +9,7 @@ use super::{Hit, Material, MaterialId, Ray, SceneSpec, TimedRay, WorldError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use zsim_base::geometry::{Route, Surface, SurfacePoint, Vector};
-use zsim_base::spec::{Kind, NamedSpec, Source, find};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find, parse_named};
 
 /// Distance within which two hits are the same surface for [`World::cast_beyond`], m.
 const SAME_SURFACE_M: f64 = 1e-4;
@@ -220,5 +220,29 @@ impl World {
 impl Surface for World {
     fn nearest(&self, point_in_world: &Vector, reach_m: f64) -> Option<SurfacePoint> {
         self.nearest_material(point_in_world, reach_m).map(|(point, _)| point)
+    }
+}
+
+impl NamedSpec for SceneSpec {
+    const KIND: Kind = Kind::Scene;
+    type Error = WorldError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        let scene: Self = parse_named(source)?;
+        if scene.name.is_empty() {
+            return Ok(Self { name: source.stem(), ..scene });
+        }
+        Ok(scene)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match World::build(self, source) {
+            Ok(world) => Ok([world.notes(), &world.route_warnings()].concat()),
+            Err(WorldError::Scene(error) | WorldError::Mesh(error)) => Err(error),
+        }
+    }
+
+    fn resolved(self, source: &Source) -> Result<Self, WorldError> {
+        self.with_includes(source)
     }
 }

@@ -159,7 +159,7 @@ fn all_keys_that_are_missing_are_named_at_once() {
     ] {
         let stderr = error(kind, text);
         assert!(stderr.contains(message), "{text}: {stderr}");
-        let help = format!("help: `zsim spec reference {}` lists the keys", kind.noun().to_lowercase());
+        let help = format!("help: `zsim spec reference {}` lists the keys", kind.key());
         assert!(stderr.contains(&help), "{text}: {stderr}");
     }
 }

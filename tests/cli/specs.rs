@@ -4,47 +4,19 @@ use crate::command::run;
 use crate::command::{exits_with, zsim};
 use crate::recording::readers::python;
 use crate::skip::run_or_skip;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::path::Path;
-use zsim::dynamics::HeadSpec;
-use zsim::elasticity::SpringSpec;
-use zsim::estimation::EstimatorSpec;
-use zsim::motion::MotionSpec;
-use zsim::sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use zsim::simulation::FaultsSpec;
-use zsim::spec::{Kind, find, names, parse};
-use zsim::study::design::DesignSpec;
-use zsim::study::reproduction::ExperimentSpec;
-use zsim::study::sweep::SweepSpec;
-use zsim::world::SceneSpec;
+use zsim::spec::{Kind, names};
+use zsim::study::spec_types;
 
 fn printed(verb: &str, kind: Kind) -> String {
-    let kind = kind.noun().to_lowercase();
-    exits_with(0, zsim().args(["spec", verb, &kind])).0
+    let kind = kind.key();
+    exits_with(0, zsim().args(["spec", verb, kind])).0
 }
 
-/// The shipped spec `name` as JSON; `None` if the text is not a `T`.
-fn as_json<T: DeserializeOwned + Serialize>(kind: Kind, name: &str) -> Option<Value> {
-    Some(serde_json::to_value(parse::<T>(&find(kind, name).unwrap()).ok()?).unwrap())
-}
-
+/// The shipped spec `name` as JSON.
 fn shipped(kind: Kind, name: &str) -> Value {
-    let json = match kind {
-        Kind::Scene => as_json::<SceneSpec>(kind, name),
-        Kind::Head => as_json::<HeadSpec>(kind, name),
-        Kind::Spring => as_json::<SpringSpec>(kind, name),
-        Kind::Lidar => as_json::<LidarSpec>(kind, name),
-        Kind::Imu => as_json::<ImuSpec>(kind, name),
-        Kind::Clock => as_json::<ClocksSpec>(kind, name),
-        Kind::Faults => as_json::<FaultsSpec>(kind, name),
-        Kind::Motion => as_json::<MotionSpec>(kind, name),
-        Kind::Estimator => as_json::<EstimatorSpec>(kind, name),
-        Kind::Study => as_json::<SweepSpec>(kind, name).or_else(|| as_json::<DesignSpec>(kind, name)),
-        Kind::Experiment => as_json::<ExperimentSpec>(kind, name),
-    };
-    json.unwrap_or_else(|| panic!("{}/{name} does not parse", kind.folder()))
+    spec_types::load(kind, name).unwrap()["spec"].take()
 }
 
 /// The errors of each value by the schema of its kind, by an independent validator; `None` if it is not installed.
@@ -89,8 +61,7 @@ fn a_schema_rejects_what_the_parser_rejects() {
 #[test]
 fn the_reference_in_docs_is_current() {
     for kind in Kind::ALL {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/reference/{}.md", kind.noun().to_lowercase()));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/reference/{}.md", kind.key()));
         let written = std::fs::read_to_string(&path).unwrap_or_default();
         assert!(written == printed("reference", kind), "{} is not current", path.display());
     }

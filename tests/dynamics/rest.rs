@@ -128,7 +128,7 @@ fn gravity_amplifies_a_slow_tilt_of_the_base() {
 fn every_shipped_head_is_valid_and_stays_at_rest() {
     for name in names(Kind::Head) {
         let model = shipped(&name);
-        let rests_s = match load::<HeadSpec>(Kind::Head, &name).unwrap().linkage {
+        let rests_s = match load::<HeadSpec>(&name).unwrap().linkage {
             LinkageSpec::Actuated { motor, .. } => motor.still_s,
             _ => 10.0,
         };
@@ -137,7 +137,7 @@ fn every_shipped_head_is_valid_and_stays_at_rest() {
         assert!(moved.translation.vector.norm() < 1e-9, "{name} moves by {moved}");
     }
     for name in names(Kind::Spring) {
-        load::<SpringSpec>(Kind::Spring, &name).unwrap().design().unwrap();
+        load::<SpringSpec>(&name).unwrap().design().unwrap();
     }
 }
 

@@ -7,7 +7,7 @@ use zsim::measurement::{ImuAveraging, ImuSample};
 use zsim::motion;
 use zsim::random::Seed;
 use zsim::sensors::{Imu, ImuSpec, Track, ideal_reading};
-use zsim::spec::{self, Kind, Source};
+use zsim::spec::{self, Source};
 use zsim::time::{NANOS_PER_SECOND, Stamp};
 
 /// The head rests for the first 4 s, then swings for 30 s.
@@ -45,7 +45,7 @@ fn samples(imu: &Track, made_as: ImuAveraging, rate_hz: i64) -> Vec<ImuSample> {
 
 /// Largest position error of the integration, m.
 fn error_m(imu: &Track, samples: &[ImuSample], taken_as: ImuAveraging) -> f64 {
-    let ideal: ImuSpec = spec::load(Kind::Imu, "ideal_1khz").unwrap();
+    let ideal: ImuSpec = spec::load("ideal_1khz").unwrap();
     let noise = Imu::new(&ideal, &Source::in_memory("test.ron", "")).unwrap().noise();
     let integrated = integrate_imu(samples, &noise, taken_as, &imu.kinematics(0.0), &load("default").unwrap()).unwrap();
     let error = |stamp: Stamp, pose: &Pose| {

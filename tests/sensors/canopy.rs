@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use zsim::geometry::{Kinematics, Pose};
 use zsim::random::Seed;
 use zsim::sensors::{Lidar, LidarErrors, LidarSpec, ScanTiming, Switch, Track};
-use zsim::spec::{self, Kind, Source, parse};
+use zsim::spec::{self, Source, parse};
 use zsim::time::Stamp;
 use zsim::world::World;
 
@@ -30,7 +30,7 @@ fn meadow() -> World {
 
 /// Ranges of 20 scans of 1000 beams within half a degree of the x axis, without range noise.
 fn ranges(seed: u64, noise: Switch) -> Vec<f64> {
-    let mut spec: LidarSpec = spec::load(Kind::Lidar, "utm30lx").unwrap();
+    let mut spec: LidarSpec = spec::load("utm30lx").unwrap();
     (spec.errors.range.near_sigma_m, spec.errors.range.bias_sigma_m, spec.errors.detection.weak_bias_m) =
         (0.0, 0.0, 0.0);
     spec.errors.range.resolution_m = 0.0;

@@ -11,7 +11,7 @@ use zsim::signal::allan_deviation;
 use zsim::spec::{self, Kind, Source};
 
 fn spec_of(name: &str) -> ImuSpec {
-    spec::load(Kind::Imu, name).unwrap()
+    spec::load(name).unwrap()
 }
 
 fn imu(spec: &ImuSpec) -> Imu {

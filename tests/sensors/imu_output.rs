@@ -6,11 +6,11 @@ use zsim::geometry::{Kinematics, Pose, Rotation, Vector};
 use zsim::measurement::ImuAveraging;
 use zsim::random::Seed;
 use zsim::sensors::{Imu, ImuErrors, ImuSampler, ImuSpec, InertialReading, OutputFilterSpec, WarmUpSpec};
-use zsim::spec::{self, Kind, Source};
+use zsim::spec::{self, Source};
 
 /// An IMU without noise whose samples are not averaged, with 200 samples a second.
 fn ideal(filter: Option<OutputFilterSpec>) -> ImuSpec {
-    let ideal: ImuSpec = spec::load(Kind::Imu, "ideal_1khz").unwrap();
+    let ideal: ImuSpec = spec::load("ideal_1khz").unwrap();
     ImuSpec { rate_hz: 200.0, averaging: ImuAveraging::None, output_filter: filter, ..ideal }
 }
 

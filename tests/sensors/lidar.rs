@@ -11,7 +11,7 @@ use zsim::time::Stamp;
 use zsim::world::World;
 
 fn spec_of(name: &str) -> LidarSpec {
-    spec::load(Kind::Lidar, name).unwrap()
+    spec::load(name).unwrap()
 }
 
 fn lidar(spec: &LidarSpec) -> Lidar {

@@ -9,7 +9,7 @@ use zsim::measurement::{ImuSample, LidarScan, Sink, SinkError};
 use zsim::random::Seed;
 use zsim::sensors::{ClockSpec, Clocks, ClocksSpec, Cylinder, Imu, Lidar, Scenery, SurfaceHit};
 use zsim::simulation::{EPOCH, Outputs, Rig, STEP_S, SimulationError, SimulationSummary, simulate};
-use zsim::spec::{self, Kind, Source};
+use zsim::spec::{self, Source};
 use zsim::time::{Span, Stamp};
 use zsim::truth::{ClockTruth, TruthSample, TruthSink};
 
@@ -94,8 +94,8 @@ impl Run {
         let rig = Rig {
             scenery: &Room,
             carrier: &self.carrier,
-            lidar: &Lidar::new(&spec::load(Kind::Lidar, self.lidar).unwrap(), &source).unwrap(),
-            imu: &Imu::new(&spec::load(Kind::Imu, self.imu).unwrap(), &source).unwrap(),
+            lidar: &Lidar::new(&spec::load(self.lidar).unwrap(), &source).unwrap(),
+            imu: &Imu::new(&spec::load(self.imu).unwrap(), &source).unwrap(),
             base_imu: None,
             clocks: Clocks::new(&self.clocks, &source, EPOCH).unwrap(),
             head_from_laser: head_from_laser(),
@@ -318,8 +318,8 @@ fn a_motion_that_ends_before_the_run_is_an_error() {
     let rig = Rig {
         scenery: &Room,
         carrier: &[],
-        lidar: &Lidar::new(&spec::load(Kind::Lidar, "utm30lx").unwrap(), &source).unwrap(),
-        imu: &Imu::new(&spec::load(Kind::Imu, "3dm_gx2").unwrap(), &source).unwrap(),
+        lidar: &Lidar::new(&spec::load("utm30lx").unwrap(), &source).unwrap(),
+        imu: &Imu::new(&spec::load("3dm_gx2").unwrap(), &source).unwrap(),
         base_imu: None,
         clocks: Clocks::new(&ClocksSpec { lidar: exact(), imu: exact() }, &source, EPOCH).unwrap(),
         head_from_laser: head_from_laser(),

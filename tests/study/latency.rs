@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zsim::run::timing::{ClockState, Disturbance};
-use zsim::spec::{Kind, Source, find, parse};
+use zsim::spec::{Kind, NamedSpec, Source, find, parse};
 use zsim::study::StudyError;
 use zsim::study::latency::{LatencyResult, csv, curve_figure, map_figure, text_table};
 use zsim::study::reproduction::ExperimentSpec;
@@ -103,6 +103,6 @@ fn an_invalid_study_is_refused() {
     }
     let figure = find(Kind::Experiment, "fig4").unwrap();
     let source = Source { text: figure.text.replace("\"timing\"", "\"imu_quality\""), ..figure };
-    let error = parse::<ExperimentSpec>(&source).unwrap().check(&source).unwrap_err().to_string();
+    let error = parse::<ExperimentSpec>(&source).unwrap().check_model(&source).unwrap_err().to_string();
     assert!(error.contains("has no `timing`"), "{error}");
 }

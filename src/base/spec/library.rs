@@ -38,81 +38,67 @@ impl Source {
     }
 }
 
-/// Kind of a spec; it determines the folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
-    /// A world: `scenes/`.
-    Scene,
-    /// A head and linkage: `specs/heads/`.
-    Head,
-    /// A spring: `specs/springs/`.
-    Spring,
-    /// A lidar: `specs/lidars/`.
-    Lidar,
-    /// An inertial measurement unit: `specs/imus/`.
-    Imu,
-    /// The clocks of the sensors: `specs/clocks/`.
-    Clock,
-    /// Faults of the sensors and of their delivery: `specs/faults/`.
-    Faults,
-    /// How the base moves: `specs/motions/`.
-    Motion,
-    /// The estimator's settings: `specs/estimators/`.
-    Estimator,
-    /// A study: `specs/studies/`.
-    Study,
-    /// An experiment of the paper: `specs/experiments/`.
-    Experiment,
+/// Defines the kinds of specs. Each has a key, for commands and for the inputs of a run, a noun for messages, and a folder.
+macro_rules! kinds {
+    ($($(#[$meaning:meta])* $kind:ident: $key:literal, $noun:literal, $folder:literal;)*) => {
+        /// Kind of a spec; it determines the folder.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Kind {
+            $($(#[$meaning])* $kind,)*
+        }
+
+        impl Kind {
+            /// All kinds.
+            pub const ALL: [Kind; [$($key),*].len()] = [$(Kind::$kind),*];
+
+            /// Name of the kind in commands, and the last word of its keys in the inputs of a run.
+            pub fn key(self) -> &'static str {
+                match self { $(Kind::$kind => $key),* }
+            }
+
+            /// Name of the kind for messages.
+            pub fn noun(self) -> &'static str {
+                match self { $(Kind::$kind => $noun),* }
+            }
+
+            /// Folder of these specs, relative to the project root.
+            pub fn folder(self) -> &'static str {
+                match self { $(Kind::$kind => $folder),* }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// A world.
+    Scene: "scene", "scene", "scenes";
+    /// A head and linkage.
+    Head: "head", "head", "specs/heads";
+    /// A spring.
+    Spring: "spring", "spring", "specs/springs";
+    /// A lidar.
+    Lidar: "lidar", "lidar", "specs/lidars";
+    /// An inertial measurement unit.
+    Imu: "imu", "IMU", "specs/imus";
+    /// The clocks of the sensors.
+    Clock: "clock", "clock", "specs/clocks";
+    /// Faults of the sensors and of their delivery.
+    Faults: "faults", "faults", "specs/faults";
+    /// How the base moves.
+    Motion: "motion", "motion", "specs/motions";
+    /// The estimator's settings.
+    Estimator: "estimator", "estimator", "specs/estimators";
+    /// A study.
+    Study: "study", "study", "specs/studies";
+    /// An experiment of the paper.
+    Experiment: "experiment", "experiment", "specs/experiments";
 }
 
 impl Kind {
-    /// All kinds.
-    pub const ALL: [Kind; 11] = [
-        Kind::Scene,
-        Kind::Head,
-        Kind::Spring,
-        Kind::Lidar,
-        Kind::Imu,
-        Kind::Clock,
-        Kind::Faults,
-        Kind::Motion,
-        Kind::Estimator,
-        Kind::Study,
-        Kind::Experiment,
-    ];
-
-    /// Folder of these specs, relative to the project root.
-    pub fn folder(self) -> &'static str {
-        match self {
-            Kind::Scene => "scenes",
-            Kind::Head => "specs/heads",
-            Kind::Spring => "specs/springs",
-            Kind::Lidar => "specs/lidars",
-            Kind::Imu => "specs/imus",
-            Kind::Clock => "specs/clocks",
-            Kind::Faults => "specs/faults",
-            Kind::Motion => "specs/motions",
-            Kind::Estimator => "specs/estimators",
-            Kind::Study => "specs/studies",
-            Kind::Experiment => "specs/experiments",
-        }
-    }
-
-    /// Name of the kind for messages.
-    pub fn noun(self) -> &'static str {
-        match self {
-            Kind::Scene => "scene",
-            Kind::Head => "head",
-            Kind::Spring => "spring",
-            Kind::Lidar => "lidar",
-            Kind::Imu => "IMU",
-            Kind::Clock => "clock",
-            Kind::Faults => "faults",
-            Kind::Motion => "motion",
-            Kind::Estimator => "estimator",
-            Kind::Study => "study",
-            Kind::Experiment => "experiment",
-        }
+    /// The kind of the spec that an input of a run names: an IMU for the keys `imu` and `base_imu`.
+    pub fn of_input(key: &str) -> Option<Self> {
+        let last = key.rsplit('_').next();
+        Self::ALL.into_iter().find(|kind| last == Some(kind.key()))
     }
 }
 

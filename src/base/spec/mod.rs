@@ -66,19 +66,19 @@ pub fn parse_named<T: NamedSpec>(source: &Source) -> Result<T, SpecError> {
     parse(source).map_err(|error: SpecError| match error.missing() {
         Some(missing) => {
             let message = missing.message(schema_for!(T).as_value());
-            let help = format!("`zsim spec reference {}` lists the keys", T::KIND.noun().to_lowercase());
+            let help = format!("`zsim spec reference {}` lists the keys", T::KIND.key());
             error.with_message(message).with_help(help)
         }
         None => error,
     })
 }
 
-/// Finds and parses the spec of `kind` called `name`: a path, or a name in the library.
+/// Finds and parses the spec called `name`: a path, or a name in the library.
 ///
 /// # Errors
 /// If there is no such spec, or it is invalid.
-pub fn load<T: NamedSpec>(kind: Kind, name: &str) -> Result<T, SpecError> {
-    T::parse(&find(kind, name)?)
+pub fn load<T: NamedSpec>(name: &str) -> Result<T, SpecError> {
+    T::parse(&find(T::KIND, name)?)
 }
 
 /// Writes a spec as RON that [`parse`] reads back to the same numbers.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A spec that a run refers to by name.
-pub trait NamedSpec: DeserializeOwned + JsonSchema {
+pub trait NamedSpec: Serialize + DeserializeOwned + JsonSchema {
     /// Kind of the spec; it determines the folder in the library.
     const KIND: Kind;
 
@@ -19,6 +19,12 @@ pub trait NamedSpec: DeserializeOwned + JsonSchema {
     /// # Errors
     /// As [`parse`](super::parse).
     fn parse(source: &Source) -> Result<Self, SpecError>;
+
+    /// Builds the model that the spec, read from `source`, describes, as a run does; returns warnings.
+    ///
+    /// # Errors
+    /// If values contradict each other, or if a file is missing or invalid.
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError>;
 
     /// The spec with the content of the files that it includes.
     ///

@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     if wanted == 0 {
         return Err(Usage("--elements 0: must be at least 1".to_owned()).into());
     }
-    let elements = wanted.min(sweep.tasks() as u64).max(1);
+    let elements = wanted.min(sweep.jobs() as u64).max(1);
     let threads = global.threads.map_or(1, std::num::NonZeroUsize::get);
     let submission = Submission { sweep: &sweep, folder: &folder, elements, threads };
     let file = match (&arguments.image, &arguments.claim) {

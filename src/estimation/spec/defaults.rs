@@ -5,6 +5,7 @@ use super::{
     ClockSpec, EstimatorSpec, ExtrinsicsSpec, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec,
     SurfelSpec, ViewSpec,
 };
+use crate::EstimationError;
 use std::sync::LazyLock;
 use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, Tree, built_in, parse_over};
 
@@ -33,6 +34,14 @@ impl NamedSpec for EstimatorSpec {
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
         parse_over(source, Some(tree()?))
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match self.check() {
+            Ok(()) => Ok(Vec::new()),
+            Err(EstimationError::Setting { key, message }) => Err(SpecError::about(source, key, message)),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
     }
 }
 

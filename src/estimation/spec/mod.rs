@@ -10,7 +10,7 @@ pub use places::PlacesSpec;
 pub use registration::RegistrationSpec;
 use serde::{Deserialize, Serialize};
 pub use surfel::{MatchingSpec, SurfelSpec};
-use zsim_base::spec::{Kind, SpecError};
+use zsim_base::spec::SpecError;
 
 /// Settings of the estimator; the defaults are in `specs/estimators/default.ron`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -192,7 +192,7 @@ pub struct ViewSpec {
 /// # Errors
 /// If the spec does not exist or is invalid.
 pub fn load(name: &str) -> Result<EstimatorSpec, SpecError> {
-    zsim_base::spec::load(Kind::Estimator, name)
+    zsim_base::spec::load(name)
 }
 
 impl EstimatorSpec {

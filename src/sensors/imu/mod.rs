@@ -14,7 +14,7 @@ pub use spec::{AccelSpec, GaussMarkovSpec, GyroSpec, ImuSpec, OutputFilterSpec, 
 
 use triad_model::TriadModel;
 use zsim_base::measurement::{ImuAveraging, ImuNoise};
-use zsim_base::spec::{Source, SpecError};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named};
 
 /// An inertial measurement unit.
 #[derive(Debug, Clone)]
@@ -92,5 +92,18 @@ impl Imu {
             gyro_limit_rad_per_s: self.gyro.limit,
             accel_limit_m_per_s2: self.accel.limit,
         }
+    }
+}
+
+impl NamedSpec for ImuSpec {
+    const KIND: Kind = Kind::Imu;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        Imu::new(self, source).map(|_| Vec::new())
     }
 }

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 use zsim_base::geometry::STANDARD_GRAVITY_M_PER_S2;
 use zsim_base::measurement::ImuAveraging;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
+use zsim_base::spec::{Source, SpecError, checked};
 
 /// Accepted sample rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 1.0..=10_000.0;
@@ -288,14 +288,5 @@ impl GaussMarkovSpec {
     /// The process in SI units; `unit` is the unit of the parent key.
     fn model(&self, unit: f64) -> GaussMarkov {
         GaussMarkov { sigma: self.sigma * unit, time_s: self.time_s }
-    }
-}
-
-impl NamedSpec for ImuSpec {
-    const KIND: Kind = Kind::Imu;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
     }
 }

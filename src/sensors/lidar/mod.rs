@@ -24,7 +24,7 @@ use pattern::{Pattern, Plane};
 use std::f64::consts::TAU;
 use zsim_base::geometry::{Rotation, Vector};
 use zsim_base::measurement::LidarNoise;
-use zsim_base::spec::{Source, SpecError};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named};
 use zsim_base::time::Span;
 
 /// Maximum number of rays of a beam.
@@ -97,5 +97,18 @@ impl Lidar {
     /// Range noise for an estimator: as in the spec, also if the errors are switched off.
     pub fn noise(&self) -> LidarNoise {
         self.spec.range_noise()
+    }
+}
+
+impl NamedSpec for LidarSpec {
+    const KIND: Kind = Kind::Lidar;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        Lidar::new(self, source).map(|_| Vec::new())
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 use zsim_base::geometry::Vector;
 use zsim_base::measurement::LidarNoise;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
+use zsim_base::spec::{Source, SpecError, checked};
 
 /// Accepted scan rates, Hz.
 const RATES_HZ: RangeInclusive<f64> = 0.1..=1000.0;
@@ -249,14 +249,5 @@ impl LidarSpec {
             std::iter::once(axis).chain(around)
         });
         (rays.collect(), &[0.5, TWELFTH, TWELFTH, TWELFTH, TWELFTH, TWELFTH, TWELFTH])
-    }
-}
-
-impl NamedSpec for LidarSpec {
-    const KIND: Kind = Kind::Lidar;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
     }
 }

@@ -1,7 +1,7 @@
 //! Files that a spec of faults refers to.
 
 use super::{FaultKind, FaultsSpec, check};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named, text_file};
+use zsim_base::spec::{Kind, Source, SpecError, text_file};
 
 /// Maximum number of arrival times in a file: bounds the memory.
 const MAX_ARRIVALS: usize = 1_000_000;
@@ -50,17 +50,4 @@ fn arrivals(file: &Source) -> Result<Vec<f64>, SpecError> {
         }
     }
     Ok(arrivals_s)
-}
-
-impl NamedSpec for FaultsSpec {
-    const KIND: Kind = Kind::Faults;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
-    }
-
-    fn resolved(self, source: &Source) -> Result<Self, SpecError> {
-        self.with_files(source)
-    }
 }

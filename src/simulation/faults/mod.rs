@@ -26,7 +26,7 @@ use clock::ClockFaults;
 use interval::Interval;
 use zsim_base::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use zsim_base::measurement::Calibration;
-use zsim_base::spec::{Source, SpecError};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, parse_named};
 use zsim_sensors::Lidar;
 
 /// Checked faults.
@@ -106,5 +106,22 @@ impl Faults {
         let other = if is_imu { FaultySensor::Lidar } else { FaultySensor::Imu };
         let faults = self.spec.faults.iter().enumerate().filter(move |(_, fault)| fault.sensor != other);
         faults.map(|(index, fault)| (index, &fault.fault, Interval::from_spec(fault)))
+    }
+}
+
+impl NamedSpec for FaultsSpec {
+    const KIND: Kind = Kind::Faults;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        Faults::new(&self.clone().with_files(source)?, source).map(|_| Vec::new())
+    }
+
+    fn resolved(self, source: &Source) -> Result<Self, SpecError> {
+        self.with_files(source)
     }
 }

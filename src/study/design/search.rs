@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use zsim_base::parallel::OnProgress;
 use zsim_base::parallel::PieceProgress;
 use zsim_base::random::Seed;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from};
+use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find_from, parse_named};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
 use zsim_head::HeadError;
 use zsim_head::coverage::CoveragePlan;
@@ -352,4 +352,21 @@ fn rejection(coil: &CoilDesign, evaluation: &Evaluation) -> Option<Rejection> {
     };
     let limit = evaluation.rejected_by()?.to_owned();
     Some(Rejection { coil: coil.clone(), simulated: false, limit, value })
+}
+
+impl NamedSpec for DesignSpec {
+    const KIND: Kind = Kind::Study;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match DesignSearch::new(self, source) {
+            Ok(_) => Ok(Vec::new()),
+            Err(StudyError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use super::limits::BuildLimitsSpec;
 use crate::sweep::{GoalSpec, MeasureLimitSpec, usual};
 use serde::{Deserialize, Serialize};
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
+use zsim_base::spec::checked;
 use zsim_elasticity::{EndsSpec, HandSpec, Material, SpringSpec};
 use zsim_head::spring::Shake;
 
@@ -172,14 +172,5 @@ impl CoilDesign {
             material: self.material,
             coil_restitution: 1.0,
         }
-    }
-}
-
-impl NamedSpec for DesignSpec {
-    const KIND: Kind = Kind::Study;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source)
     }
 }

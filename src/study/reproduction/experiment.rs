@@ -6,7 +6,7 @@ use crate::sweep::{ContentHash, MergedReport, Plan, Runner, Shard, Sweep, SweepS
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use zsim_base::files::write_text;
-use zsim_base::spec::{Kind, Source, find, names, parse, to_text};
+use zsim_base::spec::{Kind, NamedSpec, Source, find, names, parse, to_text};
 
 /// File with the result, which is written last.
 const RESULT_FILE: &str = "finding.ron";
@@ -50,7 +50,7 @@ impl Experiment {
     pub fn load(name: &str) -> Result<Self, StudyError> {
         let source = find(Kind::Experiment, name)?;
         let spec: ExperimentSpec = parse(&source)?;
-        spec.check(&source)?;
+        spec.check_model(&source)?;
         let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         Ok(Self { given: name.to_owned(), name: stem, spec, source, seeds: Vec::new() })
     }

@@ -209,27 +209,11 @@ impl PeaksSpec {
     }
 }
 
-impl ExperimentSpec {
-    /// Checks the spec.
-    ///
-    /// # Errors
-    /// If its numbers are inconsistent, or if a head is missing, invalid, or has no spring.
-    pub fn check(&self, source: &Source) -> Result<(), SpecError> {
-        match self {
-            ExperimentSpec::GainCurves(spec) => spec.heads(source).map(drop),
-            ExperimentSpec::Runs(spec) => spec.study(Extent::Whole, source).map(drop),
-            ExperimentSpec::Latency(spec) => {
-                [Extent::Whole, Extent::Quick].into_iter().try_for_each(|extent| spec.study(extent, source).map(drop))
-            }
-        }
-    }
-}
-
 impl TimingMapsSpec {
     /// The study of an extent, and its source.
     ///
     /// # Errors
-    /// As [`ExperimentSpec::check`].
+    /// If the study is missing or invalid, or does not fit the experiment.
     pub(super) fn study(&self, extent: Extent, source: &Source) -> Result<(SweepSpec, Source), SpecError> {
         let (key, name) = match extent {
             Extent::Whole => ("study", &self.study),
@@ -259,7 +243,7 @@ impl RunsSpec {
     /// The study of an extent, and its source.
     ///
     /// # Errors
-    /// As [`ExperimentSpec::check`].
+    /// If the study is missing or invalid, or does not fit the experiment.
     pub(super) fn study(&self, extent: Extent, source: &Source) -> Result<(SweepSpec, Source), SpecError> {
         let of_study = find_from(Kind::Study, source, &self.study)?;
         let mut spec: SweepSpec = SweepSpec::parse(&of_study)?;
@@ -311,7 +295,7 @@ impl GainCurvesSpec {
     /// Loads the heads, in the order of the designs.
     ///
     /// # Errors
-    /// As [`ExperimentSpec::check`].
+    /// If the study is missing or invalid, or does not fit the experiment.
     pub(super) fn heads(&self, source: &Source) -> Result<Vec<HeadSpec>, SpecError> {
         let invalid = |key: &str, message: String| Err(SpecError::about(source, key, message));
         let (least, most) = self.ratios;
@@ -361,5 +345,16 @@ impl NamedSpec for ExperimentSpec {
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
         parse_named(source)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        let checked = match self {
+            ExperimentSpec::GainCurves(spec) => spec.heads(source).map(drop),
+            ExperimentSpec::Runs(spec) => spec.study(Extent::Whole, source).map(drop),
+            ExperimentSpec::Latency(spec) => {
+                [Extent::Whole, Extent::Quick].into_iter().try_for_each(|extent| spec.study(extent, source).map(drop))
+            }
+        };
+        checked.map(|()| Vec::new())
     }
 }

@@ -87,8 +87,8 @@ pub struct JourneySpec {
 }
 
 impl BaseSpec {
-    /// Runs per part file: of fast runs, the work that a kill loses at most on each thread.
-    pub(super) fn runs_per_part(&self) -> u64 {
+    /// Runs per batch: of fast runs, the work that a kill loses at most on each thread.
+    pub(super) fn runs_per_batch(&self) -> u64 {
         if matches!(self, Self::Spring { .. }) { 250 } else { 1 }
     }
 }

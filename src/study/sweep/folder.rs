@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! plan.ron         the sweep's spec, all specs that it names, and the version of zsim
-//! points.csv       the runs: index, values of the axes, seed, hash, and task
-//! parts/           finished runs: one file per simulated run or per 250 closed forms, named by its hash
+//! points.csv       the runs: index (`point`), values of the axes, seed, hash, and job (`task`)
+//! parts/           finished runs: one file per batch, a simulated run or 250 closed forms, named by its hash
 //! tmp/             files being written
 //! ```
 
@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use zsim_base::files;
 use zsim_base::files::FileError;
@@ -44,12 +45,19 @@ struct PlanFile {
     named: BTreeMap<String, Value>,
 }
 
-/// Runs that are stored together in one part file.
+/// Runs that are stored together in one file.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Unit {
+pub(super) struct Batch {
     pub identity: ContentHash,
     pub first: u64,
     pub count: u64,
+}
+
+impl Batch {
+    /// Indices of the runs.
+    pub fn runs(&self) -> Range<u64> {
+        self.first..self.first + self.count
+    }
 }
 
 /// A sweep planned in a folder.
@@ -58,9 +66,9 @@ pub struct Sweep {
     pub(super) folder: PathBuf,
     /// Hash of each run.
     pub(super) identities: Vec<ContentHash>,
-    pub(super) units: Vec<Unit>,
-    /// Indices of the units of each task, ordered by the first unit.
-    pub(super) tasks: Vec<Vec<u32>>,
+    pub(super) batches: Vec<Batch>,
+    /// Indices of the batches of each job, ordered by the first batch.
+    pub(super) jobs: Vec<Vec<u32>>,
 }
 
 impl Plan {
@@ -125,24 +133,26 @@ impl Plan {
         columns.extend(self.setting_columns());
         columns.push(("id".to_owned(), ColumnType::Text));
         let mut table = TableWriter::create(temporary, target, &columns)?;
-        let mut tasks: BTreeMap<ContentHash, i64> = BTreeMap::new();
+        let mut jobs: BTreeMap<ContentHash, i64> = BTreeMap::new();
         let mut all = Vec::new();
-        for first in (0..self.points()).step_by(RUNS_PER_GROUP as usize) {
-            let numbers: Vec<u64> = (first..(first + RUNS_PER_GROUP).min(self.points())).collect();
+        for first in (0..self.runs()).step_by(RUNS_PER_GROUP as usize) {
+            let numbers: Vec<u64> = (first..(first + RUNS_PER_GROUP).min(self.runs())).collect();
             let runs: Vec<(ContentHash, Option<ContentHash>)> =
                 numbers.par_iter().map(|index| self.hashes_of(*index)).collect::<Result<_, _>>()?;
-            let task = |(index, (_, rays)): (&u64, &(ContentHash, Option<ContentHash>))| {
+            let job = |(index, (_, rays)): (&u64, &(ContentHash, Option<ContentHash>))| {
                 Some(match rays {
-                    None => (index / self.spec().base.runs_per_part()) as i64,
+                    None => (index / self.spec().base.runs_per_batch()) as i64,
                     Some(rays) => {
-                        let next = tasks.len() as i64;
-                        *tasks.entry(*rays).or_insert(next)
+                        let next = jobs.len() as i64;
+                        *jobs.entry(*rays).or_insert(next)
                     }
                 })
             };
-            let tasks = numbers.iter().zip(&runs).map(task).collect();
-            let mut cells =
-                vec![Column::Counts(numbers.iter().map(|index| Some(*index as i64)).collect()), Column::Counts(tasks)];
+            let job_of_run = numbers.iter().zip(&runs).map(job).collect();
+            let mut cells = vec![
+                Column::Counts(numbers.iter().map(|index| Some(*index as i64)).collect()),
+                Column::Counts(job_of_run),
+            ];
             cells.extend(self.setting_cells(&numbers));
             cells.push(Column::Text(runs.iter().map(|(identity, _)| Some(identity.to_string())).collect()));
             table.write(&cells)?;
@@ -222,22 +232,21 @@ impl Sweep {
         let columns = [("id", ColumnType::Text), ("task", ColumnType::Counts)];
         let columns = open(&path)?.and_then(|file| read_columns(file, &columns).ok());
         let mut columns = columns.ok_or_else(damaged)?;
-        let task_of_run = columns.pop().map_or_else(Vec::new, Column::counts);
+        let job_of_run = columns.pop().map_or_else(Vec::new, Column::counts);
         let hashes = columns.pop().map_or_else(Vec::new, Column::texts);
         let identities: Option<Vec<ContentHash>> =
             hashes.iter().map(|hash| ContentHash::parse(hash.as_deref()?)).collect();
-        let identities = identities.filter(|all| all.len() as u64 == plan.points()).ok_or_else(damaged)?;
+        let identities = identities.filter(|all| all.len() as u64 == plan.runs()).ok_or_else(damaged)?;
         if ContentHash::of(identities.iter().map(ContentHash::bytes)).to_string() != file.identity {
             return Err(damaged().into());
         }
-        let units = units(&plan, &identities);
-        let mut tasks: BTreeMap<i64, Vec<u32>> = BTreeMap::new();
-        for (k, unit) in units.iter().enumerate() {
-            let task = task_of_run.get(unit.first as usize).copied().flatten().ok_or_else(damaged)?;
-            tasks.entry(task).or_default().push(k as u32);
+        let batches = batches(&plan, &identities);
+        let mut jobs: BTreeMap<i64, Vec<u32>> = BTreeMap::new();
+        for (k, batch) in batches.iter().enumerate() {
+            let job = job_of_run.get(batch.first as usize).copied().flatten().ok_or_else(damaged)?;
+            jobs.entry(job).or_default().push(k as u32);
         }
-        let tasks = tasks.into_values().collect();
-        Ok(Self { plan, folder: folder.to_owned(), identities, units, tasks })
+        Ok(Self { plan, folder: folder.to_owned(), identities, batches, jobs: jobs.into_values().collect() })
     }
 
     /// The plan.
@@ -245,14 +254,14 @@ impl Sweep {
         &self.plan
     }
 
-    /// Number of tasks. One worker processes a task: runs that share physics and rays, or a block of closed forms.
-    pub fn tasks(&self) -> usize {
-        self.tasks.len()
+    /// Number of jobs. One worker processes a job: runs that share physics and rays, or a batch of closed forms.
+    pub fn jobs(&self) -> usize {
+        self.jobs.len()
     }
 
-    /// Path of a unit's part file.
-    pub(super) fn part_path(&self, unit: &Unit) -> PathBuf {
-        parts_folder(&self.folder).join(format!("{}.part", unit.identity))
+    /// Path of the file of a batch.
+    pub(super) fn batch_path(&self, batch: &Batch) -> PathBuf {
+        parts_folder(&self.folder).join(format!("{}.part", batch.identity))
     }
 
     /// Folder of files being written.
@@ -261,14 +270,14 @@ impl Sweep {
     }
 }
 
-fn units(plan: &Plan, identities: &[ContentHash]) -> Vec<Unit> {
-    let size = plan.spec().base.runs_per_part();
-    let unit = |(k, block): (usize, &[ContentHash])| Unit {
+fn batches(plan: &Plan, identities: &[ContentHash]) -> Vec<Batch> {
+    let size = plan.spec().base.runs_per_batch();
+    let batch = |(k, block): (usize, &[ContentHash])| Batch {
         identity: ContentHash::of(block.iter().map(ContentHash::bytes)),
         first: k as u64 * size,
         count: block.len() as u64,
     };
-    identities.chunks(size as usize).enumerate().map(unit).collect()
+    identities.chunks(size as usize).enumerate().map(batch).collect()
 }
 
 /// Whether a folder without a plan contains files other than those of an interrupted planning.

@@ -24,6 +24,11 @@ impl ContentHash {
         Self::half(hash)
     }
 
+    /// Hash of bytes, without their length.
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        Self::half(Sha256::new_with_prefix(bytes))
+    }
+
     /// Hash of a stream of bytes, which is not kept in memory.
     pub fn of_stream(stream: &mut impl Read) -> std::io::Result<Self> {
         let mut hash = Sha256::new();

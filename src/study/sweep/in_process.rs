@@ -1,6 +1,6 @@
 //! Runs that are evaluated in this process: closed forms, and gains of a head.
 
-use super::part::RunOutcome;
+use super::outcome::RunOutcome;
 use super::tree::{ClosedForm, GainRun};
 use super::{BaseSpec, Measure, Plan};
 use crate::StudyError;

@@ -1,7 +1,7 @@
-//! Merges part files into one table, with the same bytes for any order and division of the work.
+//! Merges the files of batches into one table, with the same bytes for any order and division of the work.
 
-use super::folder::Unit;
-use super::part::Part;
+use super::folder::Batch;
+use super::outcome::{RunOutcome, Stored};
 use super::table::{Column, ColumnType, TableWriter, open, read_columns};
 use super::{Measure, Shard, Sweep};
 use crate::StudyError;
@@ -20,9 +20,9 @@ pub struct SweepStatus {
     pub done: u64,
     /// Finished runs that failed.
     pub failed: u64,
-    /// Runs that are not finished or whose parts are damaged; `zsim sweep run` runs them.
+    /// Runs that are not finished or whose files are damaged; `zsim sweep run` runs them.
     pub missing: u64,
-    /// Missing runs whose parts are damaged or belong to other runs.
+    /// Missing runs whose files are damaged or belong to other runs.
     pub damaged: u64,
     /// Extrapolated computing time of the missing runs on one thread, s.
     pub thread_s_left: Option<f64>,
@@ -32,12 +32,11 @@ impl Sweep {
     /// Progress of a shard of the sweep.
     ///
     /// # Errors
-    /// If a part cannot be opened.
+    /// If a file cannot be opened.
     pub fn status(&self, shard: Shard) -> Result<SweepStatus, StudyError> {
         let mut counter = ProgressCounter::default();
-        for unit in shard.select(&self.tasks).flatten() {
-            let unit = &self.units[*unit as usize];
-            counter.add(unit, &self.read_part(unit)?);
+        for batch in shard.select(&self.jobs).flatten().map(|batch| &self.batches[*batch as usize]) {
+            counter.add(batch, &self.read_batch(batch)?);
         }
         Ok(counter.status())
     }
@@ -45,21 +44,20 @@ impl Sweep {
     /// Writes `table.csv`, its schema `table.schema.json`, and `times.csv`: one row per finished run, in the order of the plan.
     ///
     /// The table depends only on the plan and on the set of finished runs; computing times are in a file of their own. At
-    /// most one part is in memory.
+    /// most one batch is in memory.
     ///
     /// # Errors
-    /// If a part cannot be opened, or if the tables cannot be written.
+    /// If a file cannot be opened, or if the tables cannot be written.
     pub fn merge(&self) -> Result<SweepStatus, StudyError> {
         let mut table = TableWriter::create(&self.temporary(), &self.table(), &self.table_columns())?;
         let mut times = TableWriter::create(&self.temporary(), &self.times(), &self.time_columns())?;
         let mut counter = ProgressCounter::default();
-        for unit in &self.units {
-            let part = self.read_part(unit)?;
-            counter.add(unit, &part);
-            let Part::Done { columns, .. } = part else { continue };
-            let (results, computing) = self.rows(unit, columns);
-            table.write(&results)?;
-            times.write(&computing)?;
+        for batch in &self.batches {
+            let stored = self.read_batch(batch)?;
+            counter.add(batch, &stored);
+            let Stored::Done(outcomes) = stored else { continue };
+            table.write(&self.table_cells(batch, &outcomes))?;
+            times.write(&self.time_cells(batch, &outcomes))?;
         }
         times.finish()?;
         write_text(&self.temporary(), &self.folder.join("table.schema.json"), &table_schema(&self.table_columns())?)?;
@@ -67,18 +65,21 @@ impl Sweep {
         Ok(counter.status())
     }
 
-    /// Rows of a unit's runs in the two tables, from the columns of its part.
-    fn rows(&self, unit: &Unit, mut columns: Vec<Column>) -> (Vec<Column>, Vec<Column>) {
-        let numbers: Vec<u64> = (unit.first..unit.first + unit.count).collect();
-        let identity = |index: &u64| Some(self.identities[*index as usize].to_string());
-        let points = Column::Counts(numbers.iter().map(|index| Some(*index as i64)).collect());
-        // The computing times follow the errors.
-        let times = columns.split_off(self.plan.result_measures().len() + 1);
-        let mut results = vec![points.clone()];
-        results.extend(self.plan.setting_cells(&numbers));
-        results.append(&mut columns);
-        results.push(Column::Text(numbers.iter().map(identity).collect()));
-        (results, [points].into_iter().chain(times).collect())
+    /// Cells of a batch in the table of results.
+    fn table_cells(&self, batch: &Batch, outcomes: &[RunOutcome]) -> Vec<Column> {
+        let identity = |run: u64| Some(self.identities[run as usize].to_string());
+        let mut cells = vec![index_cells(batch)];
+        cells.extend(self.plan.setting_cells(&batch.runs().collect::<Vec<_>>()));
+        cells.extend(number_cells(self.plan.result_measures().len(), outcomes, |outcome| &outcome.figures));
+        cells.push(Column::Text(outcomes.iter().map(|outcome| outcome.error.clone()).collect()));
+        cells.push(Column::Text(batch.runs().map(identity).collect()));
+        cells
+    }
+
+    /// Cells of a batch in the table of computing times.
+    fn time_cells(&self, batch: &Batch, outcomes: &[RunOutcome]) -> Vec<Column> {
+        let times = number_cells(self.plan.time_measures().len(), outcomes, |outcome| &outcome.times);
+        std::iter::once(index_cells(batch)).chain(times).collect()
     }
 
     /// Path of the table of results.
@@ -138,6 +139,21 @@ fn number_columns(measures: &[Measure]) -> impl Iterator<Item = (String, ColumnT
     measures.iter().map(|measure| (measure.key().to_owned(), ColumnType::Numbers))
 }
 
+/// Cells of the indices of the runs.
+fn index_cells(batch: &Batch) -> Column {
+    Column::Counts(batch.runs().map(|run| Some(run as i64)).collect())
+}
+
+/// Cells of `count` measures; a run that failed early has fewer figures.
+fn number_cells(
+    count: usize,
+    outcomes: &[RunOutcome],
+    figures: fn(&RunOutcome) -> &[Option<f64>],
+) -> impl Iterator<Item = Column> {
+    let cell = move |outcome: &RunOutcome, k: usize| figures(outcome).get(k).copied().flatten();
+    (0..count).map(move |k| Column::Numbers(outcomes.iter().map(|outcome| cell(outcome, k)).collect()))
+}
+
 /// Types and units of the columns as a Frictionless Table Schema (<https://datapackage.org/standard/table-schema/>).
 fn table_schema(columns: &[(String, ColumnType)]) -> Result<String, StudyError> {
     let field = |(name, column_type): &(String, ColumnType)| {
@@ -171,21 +187,16 @@ struct ProgressCounter {
 }
 
 impl ProgressCounter {
-    fn add(&mut self, unit: &Unit, part: &Part) {
-        let Part::Done { columns, .. } = part else {
-            self.missing += unit.count;
-            self.damaged += if *part == Part::Damaged { unit.count } else { 0 };
+    fn add(&mut self, batch: &Batch, stored: &Stored) {
+        let Stored::Done(outcomes) = stored else {
+            self.missing += batch.count;
+            self.damaged += if *stored == Stored::Damaged { batch.count } else { 0 };
             return;
         };
-        self.done += unit.count;
-        // The computing time of the run follows the errors.
-        let Some(at) = columns.iter().position(|column| matches!(column, Column::Text(_))) else { return };
-        if let Column::Text(errors) = &columns[at] {
-            self.failed += errors.iter().flatten().count() as u64;
-        }
-        if let Some(Column::Numbers(times)) = columns.get(at + 1) {
-            self.wall_s += times.iter().flatten().sum::<f64>();
-        }
+        self.done += batch.count;
+        self.failed += outcomes.iter().filter(|outcome| outcome.error.is_some()).count() as u64;
+        // The computing time of the run is the first.
+        self.wall_s += outcomes.iter().filter_map(|outcome| *outcome.times.first()?).sum::<f64>();
     }
 
     fn status(&self) -> SweepStatus {

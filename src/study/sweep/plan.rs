@@ -7,7 +7,7 @@ use super::identity::{ContentHash, InputHashes, input_hashes, is_after_recording
 use super::tree::{GainRun, Tree};
 use super::{BaseSpec, JourneySpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::StudyError;
-use zsim_base::spec::{Named, Source, SpecError, to_json};
+use zsim_base::spec::{Kind, Named, NamedSpec, Source, SpecError, parse_named, to_json};
 use zsim_dynamics::HeadSpec;
 use zsim_head::gains::GainsSpec;
 use zsim_run::RunInputs;
@@ -90,8 +90,8 @@ impl Plan {
         let design = design.ok_or_else(|| about(format!("more than {MAX_RUNS} runs: reduce levels or samples")))?;
         let hashes = input_hashes(&specs.base, None)?;
         let plan = Self { name: name.to_owned(), spec: spec.clone(), specs: specs.clone(), hashes, axes, design };
-        if plan.points() > MAX_RUNS {
-            return Err(about(format!("{} runs with all seeds: expected at most {MAX_RUNS}", plan.points())).into());
+        if plan.runs() > MAX_RUNS {
+            return Err(about(format!("{} runs with all seeds: expected at most {MAX_RUNS}", plan.runs())).into());
         }
         Ok(plan)
     }
@@ -107,7 +107,7 @@ impl Plan {
     }
 
     /// Number of runs.
-    pub fn points(&self) -> u64 {
+    pub fn runs(&self) -> u64 {
         self.design.count() * self.seeds() as u64
     }
 
@@ -234,4 +234,21 @@ fn is_folder_name(name: &str) -> bool {
     let is_usual = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.');
     let is_end = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
     name.chars().all(is_usual) && is_end(name.chars().next()) && is_end(name.chars().next_back())
+}
+
+impl NamedSpec for SweepSpec {
+    const KIND: Kind = Kind::Study;
+    type Error = SpecError;
+
+    fn parse(source: &Source) -> Result<Self, SpecError> {
+        parse_named(source).map(Self::with_usual_values)
+    }
+
+    fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
+        match Plan::new("study", self, source) {
+            Ok(_) => Ok(Vec::new()),
+            Err(StudyError::Spec(error)) => Err(error),
+            Err(error) => Err(SpecError::plain(&source.name, error.to_string())),
+        }
+    }
 }

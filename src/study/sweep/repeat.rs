@@ -60,17 +60,16 @@ impl Sweep {
     /// The finished journeys of `shard` that have no complete folder, ascending.
     ///
     /// # Errors
-    /// If a part cannot be opened, or if the sweep has no full runs.
+    /// If a file cannot be opened, or if the sweep has no full runs.
     pub fn runs_to_keep(&self, shard: Shard) -> Result<Vec<u64>, StudyError> {
         if !matches!(self.plan.spec().base, BaseSpec::Journey(JourneySpec { timing: None, .. })) {
             let message = "only full runs without timing errors have a folder of their own".to_owned();
             return Err(StudyError::Plan { what: "--keep-runs", message });
         }
         let mut numbers = Vec::new();
-        for unit in shard.select(&self.tasks).flatten() {
-            let unit = &self.units[*unit as usize];
-            if self.is_done(unit)? {
-                numbers.extend(unit.first..unit.first + unit.count);
+        for batch in shard.select(&self.jobs).flatten().map(|batch| &self.batches[*batch as usize]) {
+            if self.is_done(batch)? {
+                numbers.extend(batch.runs());
             }
         }
         numbers.retain(|number| !self.run_folder(*number).join(METRICS).is_file());
@@ -84,8 +83,8 @@ impl Sweep {
     /// If there is no such run, or if it has timing errors.
     pub fn check_repeat(&self, number: u64) -> Result<(), StudyError> {
         let refused = |message: String| Err(StudyError::Plan { what: "run", message });
-        if number >= self.plan.points() {
-            return refused(format!("{number}: the sweep has runs 0 to {}", self.plan.points().saturating_sub(1)));
+        if number >= self.plan.runs() {
+            return refused(format!("{number}: the sweep has runs 0 to {}", self.plan.runs().saturating_sub(1)));
         }
         match self.can_repeat() {
             true => Ok(()),

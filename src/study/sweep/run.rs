@@ -1,8 +1,7 @@
 //! Runs the missing runs of a sweep, or of a shard of it.
 
-use super::part::RunOutcome;
-use super::runner::Runner;
-use super::worker::{Worker, WorkerExit};
+use super::outcome::RunOutcome;
+use super::worker::{Runner, Worker, WorkerExit};
 use super::{BaseSpec, Sweep};
 use crate::StudyError;
 use rayon::prelude::*;
@@ -23,13 +22,13 @@ impl Shard {
     /// The complete sweep.
     pub const WHOLE: Self = Self { index: 0, count: 1 };
 
-    fn contains(self, task: usize) -> bool {
-        task % self.count == self.index
+    fn contains(self, job: usize) -> bool {
+        job % self.count == self.index
     }
 
-    /// The tasks in this shard.
-    pub(super) fn select<T>(self, tasks: &[T]) -> impl Iterator<Item = &T> {
-        tasks.iter().enumerate().filter(move |(task, _)| self.contains(*task)).map(|(_, task)| task)
+    /// The jobs in this shard.
+    pub(super) fn select<T>(self, jobs: &[T]) -> impl Iterator<Item = &T> {
+        jobs.iter().enumerate().filter(move |(job, _)| self.contains(*job)).map(|(_, job)| job)
     }
 }
 
@@ -39,54 +38,54 @@ impl Sweep {
     /// Finished runs survive any interruption. Several processes may run the same sweep at once.
     ///
     /// # Errors
-    /// If a part cannot be written, a worker cannot be started, or the sweep is stopped. A failed run is not an error
+    /// If a file cannot be written, a worker cannot be started, or the sweep is stopped. A failed run is not an error
     /// here: its row in the table contains the error.
     pub fn run(&self, shard: Shard, runner: &Runner) -> Result<(), StudyError> {
         if shard.index >= shard.count {
             let message = format!("{} of {}: shares are counted from 0", shard.index, shard.count);
             return Err(StudyError::Plan { what: "share", message });
         }
-        let mut tasks = Vec::new();
-        for task in (0..self.tasks.len()).filter(|task| shard.contains(*task)) {
-            if !self.missing_units(task)?.is_empty() {
-                tasks.push(task);
+        let mut jobs = Vec::new();
+        for job in (0..self.jobs.len()).filter(|job| shard.contains(*job)) {
+            if !self.missing_batches(job)?.is_empty() {
+                jobs.push(job);
             }
         }
         match self.plan.spec().base {
-            BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => self.run_in_process(&tasks, runner),
-            BaseSpec::Journey(_) => self.run_in_workers(&tasks, runner),
+            BaseSpec::Spring { .. } | BaseSpec::Gains { .. } => self.run_closed_forms(&jobs, runner),
+            BaseSpec::Journey(_) => self.run_in_workers(&jobs, runner),
         }
     }
 
     /// Runs closed forms and gains in this process.
-    fn run_in_process(&self, tasks: &[usize], runner: &Runner) -> Result<(), StudyError> {
-        let pieces = PieceProgress::new(tasks.len(), runner.on_progress);
-        tasks.par_iter().try_for_each(|task| {
+    fn run_closed_forms(&self, jobs: &[usize], runner: &Runner) -> Result<(), StudyError> {
+        let pieces = PieceProgress::new(jobs.len(), runner.on_progress);
+        jobs.par_iter().try_for_each(|job| {
             if runner.stop.load(Ordering::Relaxed) {
                 return Err(Stopped.into());
             }
-            self.tasks[*task].iter().try_for_each(|unit| self.run_block(*unit as usize))?;
+            self.run_job(*job, &|_| ())?;
             pieces.finish_one();
             Ok(())
         })
     }
 
     /// Runs journeys in worker processes.
-    fn run_in_workers(&self, tasks: &[usize], runner: &Runner) -> Result<(), StudyError> {
+    fn run_in_workers(&self, jobs: &[usize], runner: &Runner) -> Result<(), StudyError> {
         let threads = rayon::current_num_threads();
-        let at_once = threads.min(tasks.len()).max(1);
-        let missing = tasks.iter().map(|task| self.missing_units(*task).map(|units| units.len()));
+        let at_once = threads.min(jobs.len()).max(1);
+        let missing = jobs.iter().map(|job| self.missing_batches(*job).map(|batches| batches.len()));
         let pieces = PieceProgress::new(missing.sum::<Result<usize, StudyError>>()?, runner.on_progress);
         let next = AtomicUsize::new(0);
         let failed = AtomicBool::new(false);
         let work = || {
-            while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+            while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                 if failed.load(Ordering::Relaxed) {
                     return Ok(());
                 }
-                let worker = Worker { sweep: self, task: *task, runner, failed: &failed, pieces: &pieces };
-                // With fewer tasks than threads each task gets several: estimates of one recording run in parallel.
-                self.run_task_in_workers(&worker, (threads / at_once).max(1))
+                let worker = Worker { sweep: self, job: *job, runner, failed: &failed, pieces: &pieces };
+                // With fewer jobs than threads each job gets several: estimates of one recording run in parallel.
+                self.run_job_in_workers(&worker, (threads / at_once).max(1))
                     .inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
             }
             Ok(())
@@ -105,11 +104,11 @@ impl Sweep {
         })
     }
 
-    /// Runs a task in a worker process, and restarts the worker after a crash.
+    /// Runs a job in a worker process, and restarts the worker after a crash.
     ///
     /// The first crash may have an external cause: the remaining runs are retried on one thread. Runs that crash a
     /// single-threaded worker twice are recorded as failed.
-    fn run_task_in_workers(&self, worker: &Worker, threads: usize) -> Result<(), StudyError> {
+    fn run_job_in_workers(&self, worker: &Worker, threads: usize) -> Result<(), StudyError> {
         let (mut threads, mut last) = (threads, None);
         loop {
             let (started, reason) = match worker.attempt(threads)? {
@@ -123,24 +122,13 @@ impl Sweep {
                 continue;
             }
             // If no run has started, the simulation that all of them share failed.
-            let failed = if started.is_empty() { self.missing_units(worker.task)? } else { started };
+            let failed = if started.is_empty() { self.missing_batches(worker.job)? } else { started };
             let outcome = RunOutcome::failed(self.plan.result_measures().len(), &reason);
-            for unit in failed {
-                self.write_part(&self.units[unit], std::slice::from_ref(&outcome))?;
+            for batch in failed {
+                self.write_batch(&self.batches[batch], std::slice::from_ref(&outcome))?;
                 worker.pieces.finish_one();
             }
             last = None;
         }
-    }
-
-    /// Unfinished units of a task.
-    pub(super) fn missing_units(&self, task: usize) -> Result<Vec<usize>, StudyError> {
-        let mut missing = Vec::new();
-        for unit in self.tasks[task].iter().map(|unit| *unit as usize) {
-            if !self.is_done(&self.units[unit])? {
-                missing.push(unit);
-            }
-        }
-        Ok(missing)
     }
 }

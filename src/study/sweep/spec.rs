@@ -4,7 +4,7 @@ use super::base_spec::usual;
 use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, checked, parse_named};
+use zsim_base::spec::checked;
 
 /// A sweep: a base run, the parameters to vary, and the measures to report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -153,7 +153,7 @@ pub enum Sampling {
 
 impl SweepSpec {
     /// The sweep with the seeds and measures that its base run has by default, where the spec has none.
-    fn with_usual_values(mut self) -> Self {
+    pub(super) fn with_usual_values(mut self) -> Self {
         let (seeds, measures): (&[u64], &[Measure]) = match self.base {
             BaseSpec::Journey(_) => (&[usual::SEED], &[Measure::POSITION_RMSE_M]),
             BaseSpec::Gains { .. } => (&[], &[Measure::PEAK_GAIN]),
@@ -230,14 +230,5 @@ impl Setting {
             Self::Number(number) => (*number).into(),
             Self::Text(word) => word.as_str().into(),
         }
-    }
-}
-
-impl NamedSpec for SweepSpec {
-    const KIND: Kind = Kind::Study;
-    type Error = SpecError;
-
-    fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_named(source).map(Self::with_usual_values)
     }
 }

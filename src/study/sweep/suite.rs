@@ -35,7 +35,7 @@ impl Plan {
         }
         let mut known = BTreeSet::new();
         let mut recordings = Vec::new();
-        for run in 0..self.points() {
+        for run in 0..self.runs() {
             let identity = self.journey(run, &self.inputs(run)?)?.recording.to_string();
             if known.insert(identity.clone()) {
                 recordings.push(self.suite_recording(run, recordings.len(), identity));

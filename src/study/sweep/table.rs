@@ -3,7 +3,7 @@
 use crate::StudyError;
 use csv::{Reader, StringRecord, Writer};
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use zsim_base::files;
 use zsim_base::files::AtomicFile;
@@ -97,16 +97,16 @@ pub(super) struct TableWriter {
 impl TableWriter {
     /// Starts a table for `target`; it stays in `folder` until [`finish`](Self::finish) moves it.
     pub fn create(folder: &Path, target: &Path, columns: &[(String, ColumnType)]) -> Result<Self, StudyError> {
-        let writer = Writer::from_writer(AtomicFile::new(folder, target)?);
-        let mut table = Self { writer, target: target.to_owned() };
-        let written = write_header(&mut table.writer, columns);
+        let mut writer = Writer::from_writer(AtomicFile::new(folder, target)?);
+        let written = writer.write_record(columns.iter().map(|(name, _)| name));
         written.map_err(|error| FileError::at(target)(error.into()))?;
-        Ok(table)
+        Ok(Self { writer, target: target.to_owned() })
     }
 
     /// Appends rows: cells of all columns, of equal length.
     pub fn write(&mut self, columns: &[Column]) -> Result<(), StudyError> {
-        let written = write_rows(&mut self.writer, columns);
+        let mut rows = 0..columns.first().map_or(0, Column::len);
+        let written = rows.try_for_each(|row| self.writer.write_record(columns.iter().map(|column| column.cell(row))));
         Ok(written.map_err(|error| FileError::at(&self.target)(error.into()))?)
     }
 
@@ -115,23 +115,6 @@ impl TableWriter {
         let flushed = self.writer.into_inner().map_err(csv::IntoInnerError::into_error);
         Ok(flushed.map_err(FileError::at(&self.target))?.finish()?)
     }
-}
-
-/// A table as bytes.
-pub(super) fn to_csv(columns: &[(String, ColumnType)], cells: &[Column]) -> std::io::Result<Vec<u8>> {
-    let mut writer = Writer::from_writer(Vec::new());
-    write_header(&mut writer, columns)?;
-    write_rows(&mut writer, cells)?;
-    writer.into_inner().map_err(csv::IntoInnerError::into_error)
-}
-
-fn write_header(writer: &mut Writer<impl Write>, columns: &[(String, ColumnType)]) -> csv::Result<()> {
-    writer.write_record(columns.iter().map(|(name, _)| name))
-}
-
-fn write_rows(writer: &mut Writer<impl Write>, columns: &[Column]) -> csv::Result<()> {
-    let rows = columns.first().map_or(0, Column::len);
-    (0..rows).try_for_each(|row| writer.write_record(columns.iter().map(|column| column.cell(row))))
 }
 
 /// Opens a file; `None` if it does not exist.
@@ -201,7 +184,6 @@ mod tests {
         // -0.0 equals 0.0.
         assert!(read[1].clone().numbers()[2].unwrap().is_sign_negative());
         assert_eq!(read_columns(bytes.as_slice(), &COLUMNS[2..]).unwrap(), rows()[2..]);
-        assert_eq!(to_csv(&named, &rows()).unwrap(), bytes);
         assert!(
             bytes.starts_with(b"n,\"x, y\",w\n1,0.30000000000000004,\n-9223372036854775808,,\"a, \"\"b\"\"\r\nc\"\n")
         );

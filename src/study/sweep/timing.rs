@@ -14,14 +14,13 @@ impl Sweep {
     /// if several runs have the same timing.
     ///
     /// # Errors
-    /// If a part cannot be read.
+    /// If a file cannot be read.
     pub(super) fn latency_result(&self) -> Result<Option<LatencyResult>, StudyError> {
         if !matches!(self.plan.spec().base, BaseSpec::Journey(JourneySpec { timing: Some(_), .. })) {
             return Ok(None);
         }
         let Some(errors) = self.details::<MapErrors>()? else { return Ok(None) };
-        let inputs =
-            self.units.iter().map(|unit| Ok(self.plan.journey(unit.first, &self.plan.inputs(unit.first)?)?.inputs));
+        let inputs = (0..self.plan.runs()).map(|run| Ok(self.plan.journey(run, &self.plan.inputs(run)?)?.inputs));
         let inputs: Vec<RunInputs> = inputs.collect::<Result<_, StudyError>>()?;
         Ok(LatencyResult::of(&inputs.into_iter().zip(errors).collect::<Vec<_>>()))
     }

@@ -1,21 +1,17 @@
 //! The inputs of a run as one tree of settings: an axis of a sweep is a path into it.
 
 use super::{BaseSpec, JourneySpec, ReferenceSpec, settings};
-use crate::StudyError;
+use crate::{StudyError, spec_types};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use zsim_base::random::Seed;
-use zsim_base::spec::{self, Named, NamedSpec, Source, SpecError, name_from, to_json};
+use zsim_base::spec::{self, Kind, Named, Source, SpecError, name_from, to_json};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
-use zsim_estimation::EstimatorSpec;
 use zsim_head::gains::GainsSpec;
 use zsim_head::spring::Shake;
-use zsim_motion::MotionSpec;
 use zsim_run::{ReferenceInputs, RunInputs};
-use zsim_sensors::{ClocksSpec, ImuSpec, LidarSpec};
-use zsim_simulation::{FaultsSpec, Run, Scenario};
-use zsim_world::SceneSpec;
+use zsim_simulation::{Run, Scenario};
 
 impl JourneySpec {
     /// Loads the specs, whose names are relative to `source`; the seed is 0.
@@ -210,29 +206,16 @@ fn read<T: DeserializeOwned>(inputs: Map<String, Value>) -> Result<T, String> {
 /// # Errors
 /// If the spec is missing or invalid.
 pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
-    fn load<T: NamedSpec + Serialize>(name: &str) -> Result<Value, StudyError>
-    where
-        StudyError: From<T::Error>,
-    {
-        Ok(to_json(&Named::<T>::load(name)?)?)
-    }
-    match key {
-        "scene" => load::<SceneSpec>(name),
-        "head" => load::<HeadSpec>(name),
-        "motion" => load::<MotionSpec>(name),
-        "lidar" => load::<LidarSpec>(name),
-        "imu" | "base_imu" => load::<ImuSpec>(name),
-        "clock" => load::<ClocksSpec>(name),
-        "faults" => load::<FaultsSpec>(name),
-        "estimator" => load::<EstimatorSpec>(name),
-        _ => Err(SpecError::plain(name, format!("`{key}` is not set by the name of a spec")).into()),
+    match Kind::of_input(key) {
+        Some(kind) => spec_types::load(kind, name),
+        None => Err(SpecError::plain(name, format!("`{key}` is not set by the name of a spec")).into()),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zsim_base::spec::{Kind, names};
+    use zsim_base::spec::names;
 
     fn base() -> Tree {
         let source = spec::find(Kind::Study, "integrity").unwrap();

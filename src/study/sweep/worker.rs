@@ -1,19 +1,18 @@
-//! Supervision of a worker process that runs a task.
+//! Supervision of a worker process that does a job.
 
 use super::Sweep;
-use super::runner::Runner;
-use super::task::WorkerMessage;
+use super::job::WorkerMessage;
 use crate::StudyError;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use zsim_base::files::FileError;
-use zsim_base::parallel::PieceProgress;
-use zsim_base::parallel::Stopped;
+use zsim_base::parallel::{OnProgress, PieceProgress, Stopped};
 
 /// Interval at which the stop flag and the time limit are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -26,12 +25,23 @@ const MAX_STDERR_BYTES: u64 = 4096;
 /// Messages on stderr of a process that is out of memory: of the allocator, of the system, of thread creation.
 const OUT_OF_MEMORY: [&str; 3] = ["memory allocation of", "Cannot allocate memory", "failed to spawn thread"];
 
-/// A task to run in a worker process.
+/// Execution options of a sweep.
+#[derive(Clone, Copy)]
+pub struct Runner<'a> {
+    /// Path of the `zsim` executable: journeys run in worker processes.
+    pub program: &'a Path,
+    /// Stop flag, set by the caller.
+    pub stop: &'a AtomicBool,
+    /// Receives the finished fraction of the missing runs.
+    pub on_progress: OnProgress<'a>,
+}
+
+/// A job for a worker process.
 pub(super) struct Worker<'a> {
     pub sweep: &'a Sweep,
-    pub task: usize,
+    pub job: usize,
     pub runner: &'a Runner<'a>,
-    /// Set when another task has failed.
+    /// Set when another job has failed.
     pub failed: &'a AtomicBool,
     pub pieces: &'a PieceProgress<'a>,
 }
@@ -41,7 +51,7 @@ pub(super) struct Worker<'a> {
 pub(super) enum WorkerExit {
     /// All runs are finished.
     Done,
-    /// The process crashed or was killed; `started` are the units that had started but not finished.
+    /// The process crashed or was killed; `started` are the batches that had started but not finished.
     Crashed { started: Vec<usize>, reason: String },
 }
 
@@ -51,7 +61,7 @@ impl Worker<'_> {
         let failed = |error: std::io::Error| FileError::at(self.runner.program)(error);
         let mut stderr = tempfile::tempfile().map_err(failed)?;
         let mut child = Command::new(self.runner.program)
-            .args(["sweep", "task", "--quiet", "--threads", &threads.to_string(), "--task", &self.task.to_string()])
+            .args(["sweep", "task", "--quiet", "--threads", &threads.to_string(), "--task", &self.job.to_string()])
             .arg(&self.sweep.folder)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -94,12 +104,12 @@ impl Worker<'_> {
         let mut too_long = false;
         loop {
             match messages.recv_timeout(POLL_INTERVAL) {
-                Ok(WorkerMessage::Begin(unit)) => {
-                    started.insert(unit);
+                Ok(WorkerMessage::Begin(batch)) => {
+                    started.insert(batch);
                     since = Instant::now();
                 }
-                Ok(WorkerMessage::Done(unit)) => {
-                    started.remove(&unit);
+                Ok(WorkerMessage::Done(batch)) => {
+                    started.remove(&batch);
                     since = Instant::now();
                     self.pieces.finish_one();
                 }

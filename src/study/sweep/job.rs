@@ -1,7 +1,7 @@
-//! Execution of a task in a worker process, which limits its resources and isolates its crashes.
+//! Execution of a job in a worker process, which limits its resources and isolates its crashes.
 
 use super::identity::ContentHash;
-use super::part::RunOutcome;
+use super::outcome::RunOutcome;
 use super::plan::PlannedJourney;
 use super::{LimitSpec, Sweep, figures, needs};
 use crate::StudyError;
@@ -15,37 +15,35 @@ use zsim_simulation::Simulation;
 /// Message from a worker to its supervisor, one line on stdout: `begin 7`, `done 7`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WorkerMessage {
-    /// The run of this unit has started.
+    /// The run of this batch has started.
     Begin(usize),
-    /// The part file of this unit is written.
+    /// The file of this batch is written.
     Done(usize),
 }
 
 impl std::fmt::Display for WorkerMessage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Begin(unit) => write!(f, "begin {unit}"),
-            Self::Done(unit) => write!(f, "done {unit}"),
+            Self::Begin(batch) => write!(f, "begin {batch}"),
+            Self::Done(batch) => write!(f, "done {batch}"),
         }
     }
 }
 
 impl WorkerMessage {
     pub(super) fn parse(line: &str) -> Option<Self> {
-        let (event, unit) = line.split_once(' ')?;
-        let unit = unit.parse().ok()?;
+        let (event, batch) = line.split_once(' ')?;
+        let batch = batch.parse().ok()?;
         match event {
-            "begin" => Some(Self::Begin(unit)),
-            "done" => Some(Self::Done(unit)),
+            "begin" => Some(Self::Begin(batch)),
+            "done" => Some(Self::Done(batch)),
             _ => None,
         }
     }
 }
 
-/// Runs with the same recording.
-struct SharedRecording {
-    runs: Vec<(usize, PlannedJourney)>,
-}
+/// Runs with the same recording, each with the index of its batch.
+type SharedRecording = Vec<(usize, PlannedJourney)>;
 
 /// Limits the memory of this process, and ends it when its parent ends; only on Linux.
 ///
@@ -74,44 +72,51 @@ impl Sweep {
         self.plan.limit()
     }
 
-    /// Runs the missing runs of task `task` in this process on rayon's threads; `report` receives a message per event.
+    /// Does the missing runs of a job in this process on rayon's threads; `report` receives a message per event.
     ///
     /// # Errors
-    /// If there is no such task, or if a part cannot be written. A failed run is not an error here: its row in the
+    /// If there is no such job, or if a file cannot be written. A failed run is not an error here: its row in the
     /// table contains the error.
-    pub fn run_task(&self, task: usize, report: &(dyn Fn(WorkerMessage) + Sync)) -> Result<(), StudyError> {
-        let unknown = || StudyError::Plan {
-            what: "task",
-            message: format!("{task}: the plan has tasks 0 to {}", self.tasks.len().saturating_sub(1)),
-        };
-        let units = self.tasks.get(task).ok_or_else(unknown)?;
+    pub fn run_job(&self, job: usize, report: &(dyn Fn(WorkerMessage) + Sync)) -> Result<(), StudyError> {
+        if job >= self.jobs() {
+            let message = format!("{job}: the plan has tasks 0 to {}", self.jobs().saturating_sub(1));
+            return Err(StudyError::Plan { what: "task", message });
+        }
+        let missing = self.missing_batches(job)?;
         let Some(limit) = self.plan.limit() else {
-            return units.iter().try_for_each(|unit| self.run_block(*unit as usize));
+            return missing.into_iter().try_for_each(|batch| self.run_in_process(batch));
         };
         let mut shared: Vec<SharedRecording> = Vec::new();
         let mut groups: BTreeMap<ContentHash, usize> = BTreeMap::new();
-        for unit in self.missing_units(task)? {
-            let index = self.units[unit].first;
+        for batch in missing {
+            let index = self.batches[batch].first;
             let run = self.plan.journey(index, &self.plan.inputs(index)?)?;
             let group = *groups.entry(run.recording).or_insert(shared.len());
             if group == shared.len() {
-                shared.push(SharedRecording { runs: Vec::new() });
+                shared.push(Vec::new());
             }
-            shared[group].runs.push((unit, run));
+            shared[group].push((batch, run));
         }
         shared.chunks(MAX_RECORDINGS).try_for_each(|some| self.run_shared(some, limit, report))
     }
 
-    /// Runs a block of runs in this process, unless it is finished.
-    pub(super) fn run_block(&self, unit: usize) -> Result<(), StudyError> {
-        let unit = &self.units[unit];
-        if self.is_done(unit)? {
-            return Ok(());
+    /// Unfinished batches of a job.
+    pub(super) fn missing_batches(&self, job: usize) -> Result<Vec<usize>, StudyError> {
+        let mut missing = Vec::new();
+        for batch in self.jobs[job].iter().map(|batch| *batch as usize) {
+            if !self.is_done(&self.batches[batch])? {
+                missing.push(batch);
+            }
         }
+        Ok(missing)
+    }
+
+    /// Does the closed forms or gains of a batch.
+    fn run_in_process(&self, batch: usize) -> Result<(), StudyError> {
+        let batch = &self.batches[batch];
         let measures = self.plan.result_measures();
-        let evaluate = |index| super::in_process::evaluate(&self.plan, &measures, index);
-        let outcomes: Vec<RunOutcome> = (unit.first..unit.first + unit.count).map(evaluate).collect();
-        self.write_part(unit, &outcomes)
+        let evaluate = |run| super::in_process::evaluate(&self.plan, &measures, run);
+        self.write_batch(batch, &batch.runs().map(evaluate).collect::<Vec<_>>())
     }
 
     /// Simulates and records each group of runs, then estimates.
@@ -127,7 +132,7 @@ impl Sweep {
         let mut simulations: Vec<Simulation> = Vec::new();
         let mut groups: Vec<&SharedRecording> = Vec::new();
         for each in shared {
-            let Some((_, run)) = each.runs.first() else { continue };
+            let Some((_, run)) = each.first() else { continue };
             match Simulation::build(run.inputs.simulation.clone()) {
                 Ok(simulation) => {
                     simulations.push(simulation);
@@ -145,7 +150,7 @@ impl Sweep {
         let runs: Vec<(&TemporaryRecording, &(usize, PlannedJourney))> = recordings
             .iter()
             .zip(groups)
-            .flat_map(|(recording, each)| each.runs.iter().map(move |run| (recording, run)))
+            .flat_map(|(recording, each)| each.iter().map(move |run| (recording, run)))
             .collect();
         self.estimate_runs(&runs, limit, threads, report)
     }
@@ -159,13 +164,13 @@ impl Sweep {
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         for_each_on_threads(runs.len(), threads, |reader, index| {
-            let (recording, (unit, run)) = runs[index];
-            if !self.is_done(&self.units[*unit])? {
-                report(WorkerMessage::Begin(*unit));
+            let (recording, (batch, run)) = runs[index];
+            if !self.is_done(&self.batches[*batch])? {
+                report(WorkerMessage::Begin(*batch));
                 let outcome = self.evaluate(recording, limit.time_s, &run.inputs, reader);
-                self.write_part(&self.units[*unit], &[outcome])?;
+                self.write_batch(&self.batches[*batch], &[outcome])?;
             }
-            report(WorkerMessage::Done(*unit));
+            report(WorkerMessage::Done(*batch));
             Ok(())
         })
     }
@@ -197,9 +202,9 @@ impl Sweep {
         report: &(dyn Fn(WorkerMessage) + Sync),
     ) -> Result<(), StudyError> {
         let outcome = RunOutcome::from_error(self.plan.result_measures().len(), error);
-        shared.runs.iter().try_for_each(|(unit, _)| {
-            self.write_part(&self.units[*unit], std::slice::from_ref(&outcome))?;
-            report(WorkerMessage::Done(*unit));
+        shared.iter().try_for_each(|(batch, _)| {
+            self.write_batch(&self.batches[*batch], std::slice::from_ref(&outcome))?;
+            report(WorkerMessage::Done(*batch));
             Ok(())
         })
     }
