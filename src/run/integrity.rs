@@ -9,7 +9,7 @@ use zsim_base::files::FileError;
 use zsim_base::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::{
-    ALIGNMENT_S, Cause, Evidence, Finding, Status, TURN_LEVER_M, Warning, WarningKind, WindowReport, bound_factors,
+    ALIGNMENT_S, Event, EventKind, Evidence, Severity, Status, TURN_LEVER_M, WindowReport, bound_factors,
     covariance_blocks, findings, radius_99,
 };
 use zsim_evaluation::{Errors, Pairs, align_poses};
@@ -78,8 +78,8 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory, covariances: &[(Stamp, Pos
 
 /// The distances that similar surfaces leave open after the relocalisations so far, in quadrature, m.
 fn ambiguities(run: &OpenLoopRun) -> Vec<(Stamp, f64)> {
-    let ambiguity = |warning: &Warning| match warning.kind {
-        WarningKind::Relocalised { ambiguity_m, .. } => Some((warning.stamp, ambiguity_m)),
+    let ambiguity = |warning: &Event| match warning.kind {
+        EventKind::Relocalised { ambiguity_m, .. } => Some((warning.from, ambiguity_m)),
         _ => None,
     };
     let sum = |sum_m: &mut f64, (stamp, ambiguity_m): (Stamp, f64)| {
@@ -100,14 +100,8 @@ fn aligned_error_ratio(trajectory: &Trajectory) -> f64 {
 ///
 /// The position is then that of the IMU, whose error has the predicted size.
 fn dead_reckoned_until(windows: &[WindowReport], aligned_until: Stamp) -> Option<Stamp> {
-    let is_unconstrained = |kind: &WarningKind| {
-        matches!(
-            kind,
-            WarningKind::WeakGeometry { .. } | WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }
-        )
-    };
     let aligned = windows.iter().take_while(|window| window.stamp <= aligned_until);
-    let unconstrained = aligned.filter(|window| window.moving && window.problem.as_ref().is_some_and(is_unconstrained));
+    let unconstrained = aligned.filter(|window| window.moving && window.problem.is_some());
     unconstrained.last().map(|window| window.stamp)
 }
 
@@ -140,10 +134,10 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     radii_m
 }
 
-/// Error bounds of a result and the findings that affect it.
+/// Error bounds of a result and the causes of its status.
 pub(super) struct Integrity {
     bounds: Vec<PoseBound>,
-    findings: Vec<Finding>,
+    causes: Vec<Event>,
 }
 
 impl Integrity {
@@ -160,23 +154,28 @@ impl Integrity {
             recorded: run.recorded,
             estimated,
         };
-        let mut findings = findings(&evidence);
-        findings.extend(closed.and_then(|closed| moved_by_loop_closure(run, closed, &bounds)));
-        findings.extend(uncertain(&bounds, path_length_m(trajectory)));
-        findings.sort_by_key(|finding| std::cmp::Reverse(finding.status));
-        let lost = findings.iter().filter(|finding| finding.status == Status::Lost);
-        if let Some(lost_from) = lost.map(|finding| finding.from).min() {
+        let mut causes = findings(&evidence);
+        causes.extend(closed.and_then(|closed| moved_by_loop_closure(run, closed, &bounds)));
+        causes.extend(uncertain(&bounds, path_length_m(trajectory)));
+        causes.sort_by_key(|cause| std::cmp::Reverse(cause.severity));
+        let lost = causes.iter().filter(|cause| cause.severity == Severity::Lost);
+        if let Some(lost_from) = lost.map(|cause| cause.from).min() {
             // The error is unbounded after tracking is lost, and everywhere if this happens during the alignment.
             let is_aligned = aligned_until(trajectory).is_some_and(|until| lost_from >= until);
             let from = if is_aligned { bounds.partition_point(|bound| bound.stamp < lost_from) } else { 0 };
             bounds[from..].iter_mut().for_each(|bound| bound.bound_m_99 = f64::INFINITY);
         }
-        Self { bounds, findings }
+        Self { bounds, causes }
     }
 
-    /// The status: the most severe finding.
+    /// Returns the status of the result.
     pub fn status(&self) -> Status {
-        self.findings.iter().map(|finding| finding.status).max().unwrap_or_default()
+        Status::of(&self.causes)
+    }
+
+    /// Returns the causes of the status, most severe first.
+    pub fn causes(&self) -> &[Event] {
+        &self.causes
     }
 
     /// Bounds and standard deviations of the poses, in order of time.
@@ -198,14 +197,8 @@ impl Integrity {
 
     /// The metrics of the result `trajectory` for `metrics.json`; `pairs` are the estimated and true poses, if the truth is known.
     pub fn metrics(&self, run: &OpenLoopRun, trajectory: &Trajectory, pairs: Option<&Pairs>) -> IntegrityMetrics {
-        let since = |stamp: Stamp| stamp.seconds_since(run.recorded.0);
-        let cause = |finding: &Finding| CauseMetrics {
-            status: finding.status.name().to_owned(),
-            kind: finding.cause.kind().to_owned(),
-            from_s: since(finding.from),
-            to_s: since(finding.to),
-            sentence: finding.cause.to_string(),
-        };
+        let causes: Vec<CauseMetrics> =
+            self.causes.iter().map(|cause| CauseMetrics::new(cause, run.recorded.0)).collect();
         let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
         let all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
         let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
@@ -213,8 +206,8 @@ impl Integrity {
         IntegrityMetrics {
             bound_m_99: median(all).and_then(finite),
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
-            since_s: self.findings.iter().map(|finding| since(finding.from)).min_by(f64::total_cmp),
-            causes: self.findings.iter().map(cause).collect(),
+            since_s: causes.iter().map(|cause| cause.from_s).min_by(f64::total_cmp),
+            causes,
             within_bound: check.map(|check| check.fraction_within),
             bound_over_error: check.and_then(|check| finite(check.bound_over_error)),
             aligned_rmse_m: check.map(|check| check.rmse_m),
@@ -225,11 +218,10 @@ impl Integrity {
         }
     }
 
-    /// Computes the fraction of the time of `trajectory` in which a finding affects it; `None` without two poses.
+    /// Computes the fraction of the time of `trajectory` in which a cause degrades it; `None` without two poses.
     fn degraded_fraction(&self, trajectory: &Trajectory) -> Option<f64> {
         let (first, last) = (*trajectory.stamps().first()?, *trajectory.stamps().last()?);
-        let mut intervals: Vec<(Stamp, Stamp)> =
-            self.findings.iter().map(|finding| (finding.from, finding.to)).collect();
+        let mut intervals: Vec<(Stamp, Stamp)> = self.causes.iter().map(|cause| (cause.from, cause.to)).collect();
         intervals.sort_unstable();
         let (mut until, mut degraded_s) = (first, 0.0);
         for (from, to) in intervals {
@@ -329,22 +321,22 @@ pub fn large_error_m(path_m: f64) -> f64 {
 }
 
 /// The interval in which the bound exceeds the limit of a usable result, or else of a good result.
-fn uncertain(bounds: &[PoseBound], path_m: f64) -> Option<Finding> {
-    let lost = above_limit(bounds, LOST_FACTOR * large_error_m(path_m), Status::Lost);
-    lost.or_else(|| above_limit(bounds, large_error_m(path_m), Status::Degraded))
+fn uncertain(bounds: &[PoseBound], path_m: f64) -> Option<Event> {
+    let lost = above_limit(bounds, LOST_FACTOR * large_error_m(path_m), Severity::Lost);
+    lost.or_else(|| above_limit(bounds, large_error_m(path_m), Severity::Degraded))
 }
 
 /// The interval from the first to the last pose with a bound above `limit_m`.
-fn above_limit(bounds: &[PoseBound], limit_m: f64, status: Status) -> Option<Finding> {
+fn above_limit(bounds: &[PoseBound], limit_m: f64, severity: Severity) -> Option<Event> {
     let is_large = |bound: &&PoseBound| bound.bound_m_99 > limit_m;
     let from = bounds.iter().find(is_large)?.stamp;
     let to = bounds.iter().rev().find(is_large)?.stamp;
     let bound_m = bounds.iter().map(|bound| bound.bound_m_99).fold(0.0, f64::max);
-    Some(Finding { status, cause: Cause::Uncertain { bound_m }, from, to })
+    Some(Event { from, to, severity, kind: EventKind::Uncertain { bound_m } })
 }
 
 /// The interval in which the loop closure moved the trajectory by more than the error bound.
-fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Finding> {
+fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Event> {
     let open = closed.open_loop_recalibrated.as_ref().unwrap_or(&run.map_from_head);
     let shift = |((stamp, a), (_, b)): ((Stamp, &Pose), (Stamp, &Pose))| {
         (stamp, (a.translation.vector - b.translation.vector).norm())
@@ -356,7 +348,7 @@ fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[Po
         .collect();
     let (from, to) = (moved.first()?.0, moved.last()?.0);
     let moved_m = moved.iter().map(|(_, moved_m)| *moved_m).fold(0.0, f64::max);
-    Some(Finding { status: Status::Degraded, cause: Cause::LoopClosure { moved_m }, from, to })
+    Some(Event::over(from, to, EventKind::LoopClosure { moved_m }))
 }
 
 /// Writes `windows.csv` to `folder`.
@@ -364,7 +356,7 @@ pub(super) fn write_windows(folder: &Path, windows: &[WindowReport]) -> Result<(
     let header = "stamp_s,surfels,matches,view_matches,views,residual_rms_m,iterations,last_correction_m,conditioning,imu_contradiction,\
                   clock_offset_s,clock_rate,range_correction_m,imu_matrix,moving,trouble";
     let rows = windows.iter().map(|w| {
-        let problem = w.problem.as_ref().map_or("", |kind| kind.name());
+        let problem = w.problem.as_ref().map_or("", EventKind::key);
         format!(
             "{},{},{},{},{},{:.6},{},{:.6},{:.3e},{:.4},{:.9},{:.3e},{:.6},{:.3e},{},{problem}",
             seconds(w.stamp),
@@ -410,17 +402,12 @@ mod tests {
     #[test]
     fn overlapping_causes_degrade_a_time_once() {
         let at = |s: f64| Stamp::from_nanos(0) + Span::from_seconds(s);
-        let finding = |from: f64, to: f64| Finding {
-            status: Status::Degraded,
-            cause: Cause::NotRelocalised,
-            from: at(from),
-            to: at(to),
-        };
+        let cause = |from: f64, to: f64| Event::over(at(from), at(to), EventKind::UnknownOffset);
         let trajectory = Trajectory::from_poses([0.0, 20.0].map(|s| (at(s), Pose::identity()))).unwrap();
-        let degraded = |findings| Integrity { bounds: Vec::new(), findings }.degraded_fraction(&trajectory).unwrap();
+        let degraded = |causes| Integrity { bounds: Vec::new(), causes }.degraded_fraction(&trajectory).unwrap();
         assert_eq!(degraded(Vec::new()), 0.0);
         // 2 to 8 s, and 15 s to the end.
-        let findings = vec![finding(15.0, 30.0), finding(4.0, 8.0), finding(2.0, 6.0), finding(5.0, 5.5)];
-        assert!((degraded(findings) - 0.55).abs() < 1e-9);
+        let causes = vec![cause(15.0, 30.0), cause(4.0, 8.0), cause(2.0, 6.0), cause(5.0, 5.5)];
+        assert!((degraded(causes) - 0.55).abs() < 1e-9);
     }
 }

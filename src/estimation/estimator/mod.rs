@@ -19,7 +19,7 @@ use crate::intake::{Intake, Segment};
 use crate::local_map::LocalMap;
 use crate::localisation::MapLocalisation;
 use crate::observed::ObservedSurfels;
-use crate::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WindowReport};
+use crate::{EstimatedPose, EstimationError, EstimatorSpec, Event, OpenLoop, WindowReport};
 use zsim_base::geometry::{Pose, Trajectory, Vector};
 use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::surfel_map::SurfelMap;
@@ -117,7 +117,7 @@ impl Estimator {
     }
 
     /// The warnings so far, without those that concern the whole run.
-    pub fn warnings(&self) -> &[Warning] {
+    pub fn warnings(&self) -> &[Event] {
         &self.diagnostics.warnings
     }
 
