@@ -96,7 +96,13 @@ impl Event {
     }
 }
 
-/// Groups events by severity and key; the first event of a group is the one of the largest magnitude.
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "at {:.3} s: {}", self.from.nanos() as f64 * 1e-9, self.kind)
+    }
+}
+
+/// Groups events by severity and key; the first of a group is the largest.
 pub fn grouped<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<Vec<&'a Event>> {
     let mut groups: Vec<Vec<&Event>> = Vec::new();
     for event in events {
@@ -108,12 +114,6 @@ pub fn grouped<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<Vec<&'a E
         }
     }
     groups
-}
-
-impl fmt::Display for Event {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "at {:.3} s: {}", self.from.nanos() as f64 * 1e-9, self.kind)
-    }
 }
 
 /// Declares the kinds: `/// description`, `Kind { values } = key in metrics.json, severity, magnitude, sentence;`
@@ -414,6 +414,11 @@ kinds! {
 }
 
 impl EventKind {
+    /// Whether a window with this problem lacks matches or a solution, and is dead reckoning with the IMU.
+    pub(super) fn is_untracked(&self) -> bool {
+        matches!(self, Self::FewMatches { .. } | Self::NotSolved { .. })
+    }
+
     /// Whether the kind is a sensor fault, not a consequence of one.
     pub(super) fn is_sensor_fault(&self) -> bool {
         matches!(self, Self::Clipped { .. } | Self::FrozenImu { .. } | Self::FrozenLidar { .. })

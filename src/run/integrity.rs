@@ -105,10 +105,15 @@ fn dead_reckoned_until(windows: &[WindowReport], aligned_until: Stamp) -> Option
     unconstrained.last().map(|window| window.stamp)
 }
 
-/// End of the interval of alignment with the truth: the first 20 s, or half of a run shorter than 40 s.
+/// Returns the duration of the alignment that the bounds refer to: 20 s, or half of a run of less than 40 s.
+pub(super) fn alignment_s(duration_s: f64) -> f64 {
+    ALIGNMENT_S.min(0.5 * duration_s)
+}
+
+/// End of the alignment.
 fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
-    let (first, last) = (trajectory.stamps().first()?, trajectory.stamps().last()?);
-    Some(*first + Span::from_seconds(ALIGNMENT_S.min(0.5 * last.seconds_since(*first))))
+    let (first, last) = trajectory.span()?;
+    Some(first + Span::from_seconds(alignment_s(last.seconds_since(first))))
 }
 
 /// Computes the 99 % radii of the position error from the covariances, m.
@@ -138,6 +143,7 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
 pub(super) struct Integrity {
     bounds: Vec<PoseBound>,
     causes: Vec<Event>,
+    path_length_m: f64,
 }
 
 impl Integrity {
@@ -145,18 +151,17 @@ impl Integrity {
     pub fn of(run: &OpenLoopRun, closed: Option<&ClosedLoopRun>, trajectory: &Trajectory) -> Self {
         let covariances = closed.map_or(&run.covariances, |closed| &closed.covariances);
         let mut bounds = bounds(run, trajectory, covariances);
-        let ends = |stamps: &[Stamp]| Some((*stamps.first()?, *stamps.last()?));
-        let estimated = ends(trajectory.stamps()).unwrap_or(run.recorded);
         let evidence = Evidence {
             windows: &run.windows,
             warnings: &run.warnings,
             samples: run.samples,
             recorded: run.recorded,
-            estimated,
+            estimated: trajectory.span().unwrap_or(run.recorded),
         };
         let mut causes = findings(&evidence);
         causes.extend(closed.and_then(|closed| moved_by_loop_closure(run, closed, &bounds)));
-        causes.extend(uncertain(&bounds, path_length_m(trajectory)));
+        let path_length_m = path_length_m(trajectory);
+        causes.extend(uncertain(&bounds, path_length_m));
         causes.sort_by_key(|cause| std::cmp::Reverse(cause.severity));
         let lost = causes.iter().filter(|cause| cause.severity == Severity::Lost);
         if let Some(lost_from) = lost.map(|cause| cause.from).min() {
@@ -165,7 +170,7 @@ impl Integrity {
             let from = if is_aligned { bounds.partition_point(|bound| bound.stamp < lost_from) } else { 0 };
             bounds[from..].iter_mut().for_each(|bound| bound.bound_m_99 = f64::INFINITY);
         }
-        Self { bounds, causes }
+        Self { bounds, causes, path_length_m }
     }
 
     /// Returns the status of the result.
@@ -183,14 +188,9 @@ impl Integrity {
         &self.bounds
     }
 
-    /// Duration of the alignment that the bounds refer to: the first 20 s, or half of a run shorter than 40 s.
-    pub fn aligned_seconds(pairs: &Pairs) -> f64 {
-        ALIGNMENT_S.min(0.5 * pairs.duration_s())
-    }
-
-    /// The true errors after this alignment.
+    /// Computes the true errors after the alignment.
     pub fn aligned_errors(pairs: &Pairs) -> Option<Errors> {
-        let aligned = pairs.first_seconds(Self::aligned_seconds(pairs));
+        let aligned = pairs.first_seconds(alignment_s(pairs.duration_s()));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         Some(Errors::after(pairs, &world_from_map))
     }
@@ -200,11 +200,11 @@ impl Integrity {
         let causes: Vec<CauseMetrics> =
             self.causes.iter().map(|cause| CauseMetrics::new(cause, run.recorded.0)).collect();
         let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
-        let all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
+        let mut all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
         let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
         let check = pairs.and_then(|pairs| self.check_bounds(pairs));
         IntegrityMetrics {
-            bound_m_99: median(all).and_then(finite),
+            bound_m_99: quantile(&mut all, 0.5).and_then(finite),
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
             since_s: causes.iter().map(|cause| cause.from_s).min_by(f64::total_cmp),
             causes,
@@ -212,7 +212,7 @@ impl Integrity {
             bound_over_error: check.and_then(|check| finite(check.bound_over_error)),
             aligned_rmse_m: check.map(|check| check.rmse_m),
             largest_error_m: check.map(|check| check.largest_m),
-            path_length_m: Some(path_length_m(trajectory)),
+            path_length_m: Some(self.path_length_m),
             aligned_p95_m: check.map(|check| check.p95_m),
             degraded_fraction: self.degraded_fraction(trajectory),
         }
@@ -220,7 +220,7 @@ impl Integrity {
 
     /// Computes the fraction of the time of `trajectory` in which a cause degrades it; `None` without two poses.
     fn degraded_fraction(&self, trajectory: &Trajectory) -> Option<f64> {
-        let (first, last) = (*trajectory.stamps().first()?, *trajectory.stamps().last()?);
+        let (first, last) = trajectory.span()?;
         let mut intervals: Vec<(Stamp, Stamp)> = self.causes.iter().map(|cause| (cause.from, cause.to)).collect();
         intervals.sort_unstable();
         let (mut until, mut degraded_s) = (first, 0.0);
@@ -254,7 +254,7 @@ impl Integrity {
         }
         Some(BoundCheck {
             fraction_within: within as f64 / ratios.len() as f64,
-            bound_over_error: median(ratios)?,
+            bound_over_error: quantile(&mut ratios, 0.5)?,
             rmse_m: errors.position_rmse_m(),
             p95_m: quantile(&mut errors_m, 0.95)?,
             largest_m: *errors_m.last()?,
@@ -285,10 +285,6 @@ struct BoundCheck {
     p95_m: f64,
     /// Largest position error, m.
     largest_m: f64,
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    quantile(&mut values, 0.5)
 }
 
 /// Sorts `values`; returns the first that is above the fraction `at` of them, `None` without values.
@@ -404,7 +400,9 @@ mod tests {
         let at = |s: f64| Stamp::from_nanos(0) + Span::from_seconds(s);
         let cause = |from: f64, to: f64| Event::over(at(from), at(to), EventKind::UnknownOffset);
         let trajectory = Trajectory::from_poses([0.0, 20.0].map(|s| (at(s), Pose::identity()))).unwrap();
-        let degraded = |causes| Integrity { bounds: Vec::new(), causes }.degraded_fraction(&trajectory).unwrap();
+        let degraded = |causes| {
+            Integrity { bounds: Vec::new(), causes, path_length_m: 0.0 }.degraded_fraction(&trajectory).unwrap()
+        };
         assert_eq!(degraded(Vec::new()), 0.0);
         // 2 to 8 s, and 15 s to the end.
         let causes = vec![cause(15.0, 30.0), cause(4.0, 8.0), cause(2.0, 6.0), cause(5.0, 5.5)];

@@ -1,13 +1,9 @@
 //! Reports on the windows, and the warnings derived from them.
 
+use crate::integrity::MAX_CONTRADICTION;
 use crate::{Event, EventKind, WindowReport};
 use std::mem::discriminant;
 use zsim_base::time::Stamp;
-
-/// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
-///
-/// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
-const CONTRADICTION_THRESHOLD: f64 = 0.6;
 
 /// Tracking counts as lost after more dead reckoning than this, s, and than this fraction of the run.
 const TRACKING_LOST: (f64, f64) = (5.0, 0.2);
@@ -75,7 +71,7 @@ impl Diagnostics {
     /// Warns if IMU and lidar contradict each other by more than noise explains.
     fn warn_of_contradiction(&mut self) {
         let all = self.windows.iter().map(|window| window.imu_contradiction);
-        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTION_THRESHOLD).collect();
+        let mut times: Vec<f64> = all.filter(|times| *times > MAX_CONTRADICTION).collect();
         let [seconds, of_seconds] = [times.len(), self.windows.len()].map(|count| count as f64 * self.step_s);
         if seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds {
             times.sort_unstable_by(f64::total_cmp);
@@ -105,13 +101,10 @@ impl Diagnostics {
 /// Against the information of ten thousand matches it is that of a tenth of a match, which may be false.
 const UNOBSERVED: f64 = 1e-5;
 
-/// Whether a problem means that the window is dead reckoning with the IMU.
+/// Whether a window with this problem is dead reckoning with the IMU, along one direction at least.
 fn is_dead_reckoning(problem: &EventKind) -> bool {
-    match problem {
-        EventKind::FewMatches { .. } | EventKind::NotSolved { .. } => true,
-        EventKind::WeakGeometry { conditioning, .. } => *conditioning < UNOBSERVED,
-        _ => false,
-    }
+    let is_unobserved = matches!(problem, EventKind::WeakGeometry { conditioning, .. } if *conditioning < UNOBSERVED);
+    problem.is_untracked() || is_unobserved
 }
 
 #[cfg(test)]

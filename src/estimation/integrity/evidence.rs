@@ -8,9 +8,13 @@ const LOST_CLIPPED_FRACTION: f64 = 0.02;
 
 /// Measures are evaluated over intervals of this length, s, or half of a shorter run.
 const INTERVAL_S: f64 = 5.0;
-/// Contradiction between IMU and lidar, as a multiple of the IMU noise, above which a result is degraded or lost. 0.12
-/// to 0.35 in 24 sound runs of all scenes, at most 0.61 in a window.
-const CONTRADICTION_LIMITS: Limits = Limits { degraded: 0.6, lost: 3.0 };
+/// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise. 0.12 to 0.35 in
+/// 24 sound runs of all scenes, at most 0.61 in a window.
+///
+/// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
+pub(crate) const MAX_CONTRADICTION: f64 = 0.6;
+/// Contradiction above which a result is degraded or lost.
+const CONTRADICTION_LIMITS: Limits = Limits { degraded: MAX_CONTRADICTION, lost: 3.0 };
 /// Residual of matched surfaces above which a result is degraded or lost, m. 2 to 4.5 mm in sound runs, up to 6 mm in
 /// a window.
 const RESIDUAL_M: Limits = Limits { degraded: 0.010, lost: 0.018 };
@@ -101,12 +105,15 @@ fn attribute_loss_to_clipping(causes: &mut [Event]) {
     severe.for_each(|cause| cause.severity = Severity::Lost);
 }
 
-/// Evaluates a measure over intervals of windows: severity, largest value, start and end, if above a threshold.
+/// Evaluates a measure over intervals of windows: the cause of the `kind`, if the measure is above its limits.
+///
+/// `kind` receives the largest value, and start and end of the event.
 fn over_intervals(
     windows: &[WindowReport],
     measure: impl Fn(&[WindowReport]) -> f64,
     limits: Limits,
-) -> Option<(Severity, f64, Stamp, Stamp)> {
+    kind: impl Fn(f64, Stamp, Stamp) -> EventKind,
+) -> Option<Event> {
     let step_s = median(windows.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp)).collect());
     let length = ((INTERVAL_S / step_s.clamp(0.1, INTERVAL_S)).round() as usize).min(windows.len() / 2).max(1);
     let mut found: Option<(Severity, f64, Stamp, Stamp)> = None;
@@ -127,7 +134,7 @@ fn over_intervals(
             None => (severity, value, from, to),
         });
     }
-    found
+    found.map(|(severity, value, from, to)| Event { from, to, severity, kind: kind(value, from, to) })
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
@@ -137,7 +144,7 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 
 /// Whether a window is dead reckoning with the IMU although surfaces should have been matched.
 fn is_untracked(window: &WindowReport) -> bool {
-    matches!(window.problem, Some(EventKind::FewMatches { .. } | EventKind::NotSolved { .. }))
+    window.problem.as_ref().is_some_and(EventKind::is_untracked)
 }
 
 /// Findings from the window reports.
@@ -149,14 +156,6 @@ fn window_findings(evidence: &Evidence) -> Vec<Event> {
     let untracked =
         |interval: &[WindowReport]| interval.iter().filter(|w| is_untracked(w)).count() as f64 / interval.len() as f64;
     let fastest = |interval: &[WindowReport]| interval.iter().map(|w| w.speed_m_per_s).fold(0.0, f64::max);
-    let mut all = Vec::new();
-    let mut add = |found: Option<(Severity, f64, Stamp, Stamp)>, kind: &dyn Fn(f64, Stamp, Stamp) -> EventKind| {
-        all.extend(found.map(|(severity, value, from, to)| Event { from, to, severity, kind: kind(value, from, to) }));
-    };
-    add(over_intervals(windows, contradiction, CONTRADICTION_LIMITS), &|times, _, _| EventKind::Contradiction {
-        times,
-    });
-    add(over_intervals(windows, residual, RESIDUAL_M), &|residual_m, _, _| EventKind::PoorFit { residual_m });
     let both = |interval: &[WindowReport]| {
         // Clipped samples explain an implausible scale.
         let scales = interval.iter().map(|w| w.imu_matrix.over_model() / IMU_SCALE.degraded);
@@ -164,18 +163,21 @@ fn window_findings(evidence: &Evidence) -> Vec<Event> {
         let lidar = (residual(interval) / RESIDUAL_M.degraded).max(scale);
         lidar.min(contradiction(interval) / CONTRADICTION_LIMITS.degraded)
     };
-    add(over_intervals(windows, both, INCONSISTENT), &|ratio, _, _| EventKind::Inconsistent { ratio });
-    add(over_intervals(windows, untracked, UNTRACKED_FRACTIONS), &|_, from, to| EventKind::Untracked {
-        seconds: untracked_s(windows, from, to),
-    });
-    add(over_intervals(windows, fastest, SPEED_M_PER_S), &|speed_m_per_s, _, _| EventKind::Speed { speed_m_per_s });
+    let untracked_for = |_, from, to| EventKind::Untracked { seconds: untracked_s(windows, from, to) };
     // The head matches no surface for most of the run, and does not rest, or might move at constant velocity where the
     // lidar would not show it: the trajectory is unknown.
-    let (unobserved, assumed) =
-        (mostly_unmatched(windows, |w| !w.resting), mostly_unmatched(windows, |w| w.resting && !w.sees_rest));
-    all.extend(unobserved.map(|(seconds, from, to)| Event::over(from, to, EventKind::Untracked { seconds })));
-    all.extend(assumed.map(|(seconds, from, to)| Event::over(from, to, EventKind::RestAssumed { seconds })));
-    all
+    let unobserved = mostly_unmatched(windows, |w| !w.resting);
+    let assumed = mostly_unmatched(windows, |w| w.resting && !w.sees_rest);
+    let causes = [
+        over_intervals(windows, contradiction, CONTRADICTION_LIMITS, |times, _, _| EventKind::Contradiction { times }),
+        over_intervals(windows, residual, RESIDUAL_M, |residual_m, _, _| EventKind::PoorFit { residual_m }),
+        over_intervals(windows, both, INCONSISTENT, |ratio, _, _| EventKind::Inconsistent { ratio }),
+        over_intervals(windows, untracked, UNTRACKED_FRACTIONS, untracked_for),
+        over_intervals(windows, fastest, SPEED_M_PER_S, |speed_m_per_s, _, _| EventKind::Speed { speed_m_per_s }),
+        unobserved.map(|(seconds, from, to)| Event::over(from, to, EventKind::Untracked { seconds })),
+        assumed.map(|(seconds, from, to)| Event::over(from, to, EventKind::RestAssumed { seconds })),
+    ];
+    causes.into_iter().flatten().collect()
 }
 
 /// Returns the duration of the untracked windows from `from` to `to`, s.

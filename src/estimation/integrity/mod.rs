@@ -11,5 +11,6 @@ mod evidence;
 mod factors;
 
 pub use bound::{covariance_blocks, radius_99};
+pub(crate) use evidence::MAX_CONTRADICTION;
 pub use evidence::{Evidence, findings};
 pub use factors::bound_factors;
