@@ -141,7 +141,9 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the magnitude, if the kind has one: s, m, number or ratio; larger is worse.
+            /// Returns the magnitude, if the kind has one; larger is worse.
+            ///
+            /// It is in the unit of the value: s, m, number or ratio.
             #[expect(unused_variables, reason = "some values have no effect on the magnitude")]
             pub fn magnitude(&self) -> Option<f64> {
                 match self {

@@ -48,7 +48,7 @@ pub struct MatrixEntry {
 }
 
 impl MatrixEntry {
-    /// Returns the value over the standard deviation of the model, taken as at least 0.2 %.
+    /// Returns the value over the standard deviation of the model, at least 0.2 %.
     pub fn over_model(&self) -> f64 {
         self.value / self.model_sigma.max(MIN_MODEL_SIGMA)
     }

@@ -79,7 +79,9 @@ pub struct Evidence<'a> {
     pub estimated: (Stamp, Stamp),
 }
 
-/// Determines the causes of the status of a run, one for each kind, ordered by severity, then time.
+/// Determines the causes of the status of a run, one for each kind.
+///
+/// They are ordered by severity, then time.
 pub fn findings(evidence: &Evidence) -> Vec<Event> {
     let mut all = window_findings(evidence);
     all.extend(evidence.warnings.iter().filter_map(|warning| warning_finding(warning, evidence)));
