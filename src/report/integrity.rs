@@ -78,6 +78,11 @@ impl CauseMetrics {
             sentence: cause.kind.to_string(),
         }
     }
+
+    /// Formats the cause as one line: message and interval of time.
+    pub fn line(&self) -> String {
+        format!("{}, {:.1} to {:.1} s", self.sentence, self.from_s, self.to_s)
+    }
 }
 
 impl EventMetrics {

@@ -5,6 +5,7 @@ use zsim_base::geometry::{Pose, Vector};
 use zsim_base::measurement::LidarScan;
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::{EstimatedPose, Event, Evidence, Status, findings};
+use zsim_report::CauseMetrics;
 use zsim_report::page::LiveVerdict;
 use zsim_run::{RunEvent, Stage, StageData};
 
@@ -101,9 +102,8 @@ pub(crate) fn verdict(causes: &[Event], start: Stamp) -> LiveVerdict {
     let Some(worst) = causes.iter().max_by_key(|cause| cause.severity) else {
         return LiveVerdict { status: Status::default().name().to_owned(), reason: "no problem so far".to_owned() };
     };
-    let [from_s, to_s] = [worst.from, worst.to].map(|stamp| stamp.seconds_since(start));
-    let reason = format!("{}, {from_s:.1} to {to_s:.1} s (so far)", worst.kind);
-    LiveVerdict { status: worst.severity.name().to_owned(), reason }
+    let cause = CauseMetrics::new(worst, start);
+    LiveVerdict { reason: cause.line() + " (so far)", status: cause.status }
 }
 
 fn thinned(scan: &LidarScan) -> Vec<Return> {

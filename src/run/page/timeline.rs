@@ -9,7 +9,9 @@ use zsim_report::page::{Interval, TimelineRow};
 /// Windows with the same problem within this time are one event, s.
 const MERGED_WITHIN_S: f64 = 0.5;
 
-/// Lists causes of the status, warnings of the estimator and windows with a problem, one row for each kind; most severe first.
+/// Lists the events of a run, one row for each kind, most severe first.
+///
+/// They are the causes of the status, the warnings of the estimator, and the problems of the windows.
 pub(super) fn rows(run: &OpenLoopRun, causes: &[Event]) -> Vec<TimelineRow> {
     let problems = run.windows.iter().filter_map(|window| Some(Event::at(window.stamp, window.problem.clone()?)));
     let mut rows: BTreeMap<_, Vec<Interval>> = BTreeMap::new();
