@@ -7,7 +7,7 @@ use crate::trajectory::Trajectory;
 use crate::window::Window;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use zsim::estimation::{self, EstimatedPose, Warning};
+use zsim::estimation::{self, EstimatedPose, Event};
 use zsim::geometry;
 use zsim::measurement::{ForceUnitCheck, ImuSample, LidarReturn, LidarScan, Measurement};
 use zsim::time::Stamp;
@@ -84,7 +84,7 @@ impl Estimator {
     fn finish(&mut self, py: Python<'_>) -> Result<Trajectory, Failure> {
         let running = self.running.take().ok_or_else(ended)?;
         let result = py.detach(|| running.finish())?;
-        self.warnings = result.warnings.iter().map(Warning::to_string).collect();
+        self.warnings = result.warnings.iter().map(Event::to_string).collect();
         Ok(Trajectory(result.trajectory))
     }
 
@@ -92,7 +92,7 @@ impl Estimator {
     #[getter]
     fn warnings(&self) -> Vec<String> {
         match &self.running {
-            Some(running) => running.warnings().iter().map(Warning::to_string).collect(),
+            Some(running) => running.warnings().iter().map(Event::to_string).collect(),
             None => self.warnings.clone(),
         }
     }

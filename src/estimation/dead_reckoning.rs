@@ -6,10 +6,11 @@ use zsim_base::geometry::{Kinematics, Pose, Trajectory, Vector, gravity_in_world
 use zsim_base::measurement::{ImuAveraging, ImuNoise, ImuSample};
 use zsim_base::time::Span;
 
-/// Integrates IMU `samples` as the estimator does, with zero biases, from the motion `start` of the IMU frame.
+/// Integrates IMU samples as the estimator does, with zero biases.
 ///
-/// Returns `world_from_imu` at the boundaries of the integration intervals, about 10 ms apart, in IMU time. `start` applies
-/// at the first boundary: half a sample period before the first stamp. At least five seconds of samples are needed.
+/// `start` is the motion of the IMU frame at the start. Returns `world_from_imu` at the boundaries of the integration
+/// intervals, about 10 ms apart, in IMU time. `start` applies at the first boundary: half a sample period before the
+/// first stamp. At least five seconds of samples are needed.
 ///
 /// # Errors
 /// When there are too few samples, or the integrated poses are not finite.

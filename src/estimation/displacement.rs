@@ -12,7 +12,7 @@ pub(crate) struct Displacement {
 }
 
 impl Displacement {
-    /// The maximum over corrections, each rotation and translation.
+    /// Returns the maximum over corrections, each rotation and translation.
     pub fn max_of(corrections: impl Iterator<Item = (Vector, Vector)>) -> Self {
         // A NaN must not count as small.
         let larger = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
@@ -22,7 +22,7 @@ impl Displacement {
         })
     }
 
-    /// The larger of rotation (rad) and translation (m).
+    /// Returns the larger of rotation (rad) and translation (m).
     pub fn max(self) -> f64 {
         self.translation_m.max(self.rotation_rad)
     }

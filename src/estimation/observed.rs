@@ -68,7 +68,7 @@ pub(super) struct ObservedSurfel {
 }
 
 impl ObservedSurfels {
-    /// Number of patches.
+    /// Returns the number of patches.
     pub fn len(&self) -> usize {
         self.surfels.len()
     }
@@ -78,12 +78,16 @@ impl ObservedSurfels {
         self.surfels.is_empty()
     }
 
-    /// Run time of building the surfels, s; it differs between identical runs.
+    /// Returns the run time of building the surfels, s.
+    ///
+    /// It differs between identical runs.
     pub fn elapsed_s(&self) -> f64 {
         self.elapsed_s
     }
 
-    /// Moves each patch from the trajectory `from` to the trajectory `to`, both `map_from_head`.
+    /// Moves each patch from the trajectory `from` to the trajectory `to`.
+    ///
+    /// Both are `map_from_head`.
     pub fn along(&self, from: &Trajectory, to: &Trajectory) -> Self {
         let within = |stamp: Stamp, trajectory: &Trajectory| {
             let (first, last) = trajectory.span()?;

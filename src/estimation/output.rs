@@ -1,6 +1,6 @@
 //! Output of the estimator.
 
-use super::{LocalisedPose, ObservedSurfels, Timing, Warning, WarningKind};
+use super::{Event, EventKind, LocalisedPose, ObservedSurfels, Timing};
 use zsim_base::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use zsim_base::measurement::LidarCorrection;
 use zsim_base::time::Stamp;
@@ -48,7 +48,7 @@ pub struct MatrixEntry {
 }
 
 impl MatrixEntry {
-    /// Returns the value over the standard deviation of the model, taken as at least 0.2 %.
+    /// Returns the value over the standard deviation of the model, at least 0.2 %.
     pub fn over_model(&self) -> f64 {
         self.value / self.model_sigma.max(MIN_MODEL_SIGMA)
     }
@@ -94,7 +94,7 @@ pub struct WindowReport {
     /// Whether the lidar would show a motion of a resting head.
     pub sees_rest: bool,
     /// Problem of the solution, if any.
-    pub problem: Option<WarningKind>,
+    pub problem: Option<EventKind>,
     /// Run time, s. With its parts, the only value that differs between identical runs.
     pub elapsed_s: f64,
     /// Parts of the run time; their sum is slightly smaller.
@@ -128,7 +128,7 @@ pub struct OpenLoop {
     /// One report per window.
     pub windows: Vec<WindowReport>,
     /// Events that degraded the estimate.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<Event>,
     /// The observed surfaces, if requested.
     pub observed: ObservedSurfels,
 }

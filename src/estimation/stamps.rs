@@ -157,9 +157,9 @@ impl StampFilter {
     }
 }
 
-/// Smooths the stamps of a regular sensor, in order of arrival, in the same way as the estimator.
+/// Smooths the stamps of a regular sensor in the same way as the estimator.
 ///
-/// A projection of beams with the estimated trajectory needs these times.
+/// They are in order of arrival. A projection of beams with the estimated trajectory needs these times.
 pub fn smoothed_stamps(stamps: &[Stamp], spec: &EstimatorSpec) -> Vec<Stamp> {
     let Some(first) = stamps.first() else { return Vec::new() };
     let seconds: Vec<f64> = stamps.iter().map(|stamp| stamp.seconds_since(*first)).collect();

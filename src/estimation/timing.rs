@@ -37,7 +37,7 @@ pub struct PartTime {
 }
 
 impl Timing {
-    /// The run time of each part, in order of execution.
+    /// Returns the run time of each part, in order of execution.
     pub fn parts(&self) -> [PartTime; 9] {
         [
             ("integration", self.integration_s),

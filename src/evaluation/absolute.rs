@@ -40,27 +40,29 @@ impl Errors {
         }
     }
 
-    /// Root mean square of the distance between estimated and true position, m: the `rmse` of `evo_ape -a`.
+    /// Returns the root mean square position error, m: the `rmse` of `evo_ape -a`.
     pub fn position_rmse_m(&self) -> f64 {
         root_mean_square(&self.position_m)
     }
 
-    /// Root mean square of the angle between estimated and true attitude, rad: the `rmse` of `evo_ape -a -r angle_rad`.
+    /// Returns the root mean square angle between estimated and true attitude, rad.
+    ///
+    /// It is the `rmse` of `evo_ape -a -r angle_rad`.
     pub fn rotation_rmse_rad(&self) -> f64 {
         root_mean_square(&self.rotation_rad)
     }
 
-    /// Distance between estimated and true position at the end, m.
+    /// Returns the distance between estimated and true position at the end, m.
     pub fn end_position_m(&self) -> Option<f64> {
         self.position_m.last().map(Vector::norm)
     }
 
-    /// Mean distance between estimated and true position, m.
+    /// Returns the mean distance between estimated and true position, m.
     pub fn mean_position_m(&self) -> f64 {
         self.position_m.iter().map(Vector::norm).sum::<f64>() / self.position_m.len() as f64
     }
 
-    /// Mean rotation error about the world's vertical, rad.
+    /// Returns the mean rotation error about the world's vertical, rad.
     pub fn mean_yaw_rad(&self) -> f64 {
         self.rotation_rad.iter().map(|rotation| rotation.z).sum::<f64>() / self.rotation_rad.len() as f64
     }

@@ -5,10 +5,10 @@ use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
 /// Ratio of the second to the first singular value of the scatter below which points are collinear.
 const COLLINEAR: f64 = 1e-12;
 
-/// Computes the rigid transform that maps the points `from` to the points `to` in least squares.
+/// Aligns the points `from` to the points `to` by a rigid transform.
 ///
-/// Umeyama (1991), eq. 40-42, with the scale fixed at 1: the rotation is `U S V^T` of the singular value decomposition
-/// of the cross covariance, with the sign in `S` that makes it proper.
+/// In least squares, as Umeyama (1991), eq. 40-42, with the scale fixed at 1: the rotation is `U S V^T` of the singular
+/// value decomposition of the cross covariance, with the sign in `S` that makes it proper.
 ///
 /// # Errors
 /// When there are fewer than three pairs, or all points lie on a line.
@@ -16,9 +16,9 @@ pub fn align(to: &[Vector], from: &[Vector]) -> Result<Pose, EvaluationError> {
     least_squares(to, from, &Matrix::zeros())
 }
 
-/// Computes the rigid transform that maps the poses `from` to the poses `to` in least squares.
+/// Aligns the poses `from` to the poses `to` by a rigid transform.
 ///
-/// A rotation by an angle has the weight of a translation by `lever_m` times the angle.
+/// In least squares; a rotation by an angle has the weight of a translation by `lever_m` times the angle.
 ///
 /// The squared distance of two rotation matrices is twice the squared angle between them, so attitudes enter the cross
 /// covariance as `lever_m^2 / 2 R_to R_from^T`.

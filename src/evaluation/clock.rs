@@ -9,8 +9,9 @@ pub struct ClockError {
     pub offset_end_error_s: f64,
 }
 
-/// Computes the error of estimated offsets between the IMU and lidar clocks, both over lidar time; the truth
-/// is interpolated linearly. `None` where the two do not overlap in time.
+/// Computes the error of estimated offsets between the IMU and lidar clocks.
+///
+/// Both are over lidar time; the truth is interpolated linearly. `None` where the two do not overlap in time.
 pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<ClockError> {
     let errors = clock_errors(estimate, truth);
     let (_, last) = *errors.last()?;
@@ -18,14 +19,16 @@ pub fn clock_error(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Option<
     Some(ClockError { offset_rmse_s: mean_square.sqrt(), offset_end_error_s: last })
 }
 
-/// Estimated minus true offset at the stamps of the estimate that the truth covers, s.
+/// Computes estimated minus true offset, s.
+///
+/// The stamps are those of the estimate that the truth covers.
 pub fn clock_errors(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)]) -> Vec<(Stamp, f64)> {
     estimate.iter().filter_map(|(stamp, offset_s)| Some((*stamp, offset_s - offset_at(truth, *stamp)?))).collect()
 }
 
-/// The absolute error of the offset `after_s` seconds after the first estimate: that of the last estimate until then, s.
+/// Computes the absolute error of the offset `after_s` after the first estimate, s.
 ///
-/// `None` if the estimate ends earlier, or the truth does not cover the time.
+/// It is that of the last estimate until then. `None` if the estimate ends earlier, or the truth does not cover the time.
 pub fn clock_error_after(estimate: &[(Stamp, f64)], truth: &[(Stamp, f64)], after_s: f64) -> Option<f64> {
     let (first, _) = estimate.first()?;
     let next = estimate.partition_point(|(stamp, _)| stamp.seconds_since(*first) <= after_s);

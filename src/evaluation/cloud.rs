@@ -11,7 +11,7 @@ pub struct Thinning {
 }
 
 impl Thinning {
-    /// About `limit` of `total` points; all of them where there are no more.
+    /// Selects about `limit` of `total` points; all of them if there are no more.
     pub fn to_at_most(limit: usize, total: usize) -> Self {
         Self { fraction: if total <= limit { 1.0 } else { limit as f64 / total as f64 } }
     }
@@ -46,8 +46,10 @@ pub struct CloudSummary {
 }
 
 impl CloudErrors {
-    /// Distances of points, each with the position of the sensor (or `None`: the sign is then that of the surface).
-    /// Surfaces at more than `reach_m` are ignored.
+    /// Computes the distances of points from the nearest surface.
+    ///
+    /// Each point has the position of the sensor, or `None`: the sign is then that of the surface. Surfaces at more
+    /// than `reach_m` are ignored.
     pub fn to_surface(surface: &dyn Surface, seen: &[(Vector, Option<Vector>)], reach_m: f64) -> Self {
         let distance = |(point, from): &(Vector, Option<Vector>)| {
             let nearest = surface.nearest(point, reach_m)?;
@@ -62,7 +64,7 @@ impl CloudErrors {
         Self { signed_m: distances.into_iter().flatten().collect(), beyond_reach }
     }
 
-    /// The distances in a few numbers; `None` where no point lay within reach of a surface.
+    /// Summarises the distances; `None` if no point is within reach of a surface.
     pub fn summary(&self) -> Option<CloudSummary> {
         let count = self.signed_m.len();
         if count == 0 {

@@ -21,8 +21,9 @@ pub struct Consistency {
     pub end: [f64; 2],
 }
 
-/// Compares the errors of `pairs` with the covariances that the estimator reported at some of the stamps, in order of
-/// time. `None` where no covariance is usable.
+/// Compares the errors of `pairs` with the covariances that the estimator reported.
+///
+/// The covariances are at some of the stamps, in order of time. `None` where no covariance is usable.
 pub fn consistency(pairs: &Pairs, covariances: &[(Stamp, PoseCovariance)]) -> Option<Consistency> {
     let map_from_world = pairs.estimate().first()? * pairs.truth().first()?.inverse();
     let mut next = *pairs.stamps().first()?;

@@ -156,7 +156,9 @@ impl DeadReckoning {
         let _ = self.trajectory.push(sample.stamp, map_from_imu * self.imu_from_head);
     }
 
-    /// Returns `map_from_head` at 10 Hz on the IMU clock. If the recording is at rest to the end, the last 0.5 s are missing.
+    /// Returns `map_from_head` at 10 Hz on the IMU clock.
+    ///
+    /// If the recording is at rest to the end, the last 0.5 s are missing.
     ///
     /// # Errors
     /// When the rest at the start was too short.

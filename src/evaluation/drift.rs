@@ -21,14 +21,14 @@ pub struct Drift {
     pub end_error_m: f64,
 }
 
-/// Drift of an estimate that is aligned over the first [`ALIGNMENT_S`] seconds only.
+/// Computes the drift of an estimate that is aligned over the first 20 s only.
 ///
-/// The estimate is aligned with the truth over the first 20 s, all six degrees of freedom: by positions, and by
-/// attitudes where positions do not determine the rotation (twenty seconds of a straight path); without true attitudes by
-/// positions only. The drift is the mean
-/// distance over the last [`TAIL_S`] seconds, divided by the minutes from the middle of the first
-/// interval (where a constant drift is aligned to zero) to the middle of the last; for the yaw, the mean error over the
-/// last interval minus that over the first. So a constant drift that a test adds is returned unchanged.
+/// The estimate is aligned with the truth over the first [`ALIGNMENT_S`] seconds, all six degrees of freedom: by
+/// positions, and by attitudes where positions do not determine the rotation (twenty seconds of a straight path);
+/// without true attitudes by positions only. The drift is the mean distance over the last [`TAIL_S`] seconds, divided
+/// by the minutes from the middle of the first interval (where a constant drift is aligned to zero) to the middle of
+/// the last; for the yaw, the mean error over the last interval minus that over the first. So a constant drift that a
+/// test adds is returned unchanged.
 ///
 /// # Errors
 /// When the two intervals overlap, or the first has too little motion for an alignment.

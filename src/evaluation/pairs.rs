@@ -15,11 +15,12 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Pairs the poses of the sparser trajectory with the denser one, interpolated at their stamps.
+    /// Pairs the poses of the sparser trajectory with those of the denser one.
     ///
-    /// Interpolation cuts the corners of a path, so that a sparse truth would seem to be an error of the estimate. The
-    /// sparser trajectory is that with the larger median interval in the common time. Nothing is interpolated over a gap of
-    /// more than two of these intervals.
+    /// The denser trajectory is interpolated at the stamps of the sparser one. Interpolation cuts the corners of a
+    /// path, so that a sparse truth would seem to be an error of the estimate. The sparser trajectory is that with the
+    /// larger median interval in the common time. Nothing is interpolated over a gap of more than two of these
+    /// intervals.
     ///
     /// # Errors
     /// When the trajectories have no time in common.
@@ -40,13 +41,16 @@ impl Pairs {
         Ok(if is_truth_sparse { Self { estimate: pairs.truth, truth: pairs.estimate, ..pairs } } else { pairs })
     }
 
-    /// Median interval of the trajectory that was interpolated linearly, by [`associate`](Self::associate); `None` if all
-    /// stamps are in both.
+    /// Returns the median interval of the trajectory that was interpolated linearly.
+    ///
+    /// [`associate`](Self::associate) interpolates it; `None` if all stamps are in both.
     pub fn interpolated_over(&self) -> Option<Span> {
         self.interpolated
     }
 
-    /// The same pairs for a truth without attitudes: nothing that depends on the true rotation is evaluated.
+    /// Marks the truth as one without attitudes.
+    ///
+    /// Nothing that depends on the true rotation is evaluated.
     #[must_use]
     pub fn with_positions_only(self) -> Self {
         Self { positions_only: true, ..self }
@@ -57,9 +61,9 @@ impl Pairs {
         self.positions_only
     }
 
-    /// Pairs the estimate's poses with the true poses at the same stamps, as a [`PoseSampler`] returns them.
+    /// Pairs the estimate's poses with the true poses at the same stamps.
     ///
-    /// Poses without a true pose are not paired; the result may be empty.
+    /// A [`PoseSampler`] returns such true poses. Poses without a true pose are not paired; the result may be empty.
     pub fn of(estimate: &Trajectory, truth: &[(Stamp, Pose)]) -> Self {
         let mut pairs = Self::default();
         let mut poses = estimate.iter().peekable();
@@ -74,7 +78,7 @@ impl Pairs {
         pairs
     }
 
-    /// How many pairs.
+    /// Returns the number of pairs.
     pub fn len(&self) -> usize {
         self.stamps.len()
     }
@@ -84,17 +88,17 @@ impl Pairs {
         self.stamps.is_empty()
     }
 
-    /// The times, increasing.
+    /// Returns the times, increasing.
     pub fn stamps(&self) -> &[Stamp] {
         &self.stamps
     }
 
-    /// The estimated poses, `map_from_head`.
+    /// Returns the estimated poses, `map_from_head`.
     pub fn estimate(&self) -> &[Pose] {
         &self.estimate
     }
 
-    /// The true poses, `world_from_head`.
+    /// Returns the true poses, `world_from_head`.
     pub fn truth(&self) -> &[Pose] {
         &self.truth
     }
@@ -107,7 +111,7 @@ impl Pairs {
         }
     }
 
-    /// The pairs of the first `seconds`.
+    /// Returns the pairs of the first `seconds`.
     #[must_use]
     pub fn first_seconds(&self, seconds: f64) -> Self {
         let Some(start) = self.stamps.first() else { return self.clone() };
@@ -115,7 +119,7 @@ impl Pairs {
         self.slice(0, self.stamps.partition_point(|stamp| *stamp <= end))
     }
 
-    /// The pairs of the last `seconds`.
+    /// Returns the pairs of the last `seconds`.
     #[must_use]
     pub fn last_seconds(&self, seconds: f64) -> Self {
         let Some(end) = self.stamps.last() else { return self.clone() };
@@ -133,7 +137,7 @@ impl Pairs {
         }
     }
 
-    /// The rigid transform `world_from_map` that brings the estimated positions nearest to the true ones.
+    /// Computes `world_from_map` by aligning the estimated with the true positions.
     ///
     /// # Errors
     /// When there are fewer than three pairs, or positions on a line.
@@ -207,7 +211,7 @@ impl<'a> PoseSampler<'a> {
         self.before = Some((now, pose));
     }
 
-    /// The poses at the stamps that the trajectory covers.
+    /// Returns the poses at the stamps that the trajectory covers.
     pub fn finish(self) -> Vec<(Stamp, Pose)> {
         self.sampled
     }

@@ -55,7 +55,7 @@ impl ReferenceCloud {
         Self { elements: voxels.into_iter().filter_map(element).collect() }
     }
 
-    /// Number of surface elements.
+    /// Returns the number of surface elements.
     pub fn len(&self) -> usize {
         self.elements.len()
     }

@@ -14,10 +14,11 @@ pub struct RelativeError {
 /// Tolerance of the distance between the two poses of a pair, as a fraction of the distance: the default of `evo_rpe`.
 const TOLERANCE: f64 = 0.1;
 
-/// Relative pose error over `span`: every pose against the first one that is at least that much later.
+/// Computes the relative pose error over `span`.
 ///
-/// The error of a pair is `(T_i^-1 T_j)^-1 (S_i^-1 S_j)`, `T` true and `S` estimated (Sturm et al. 2012, eq. 1). A pair
-/// over a gap of the trajectory, longer than `span` by more than a tenth, does not count.
+/// A pair is a pose and the first one that is at least `span` later. The error of a pair is
+/// `(T_i^-1 T_j)^-1 (S_i^-1 S_j)`, `T` true and `S` estimated (Sturm et al. 2012, eq. 1). A pair over a gap of the
+/// trajectory, longer than `span` by more than a tenth, does not count.
 ///
 /// # Errors
 /// When no two pairs are `span` apart in time.
@@ -36,11 +37,11 @@ pub fn relative_error(pairs: &Pairs, span: Span) -> Result<RelativeError, Evalua
     })
 }
 
-/// Relative pose error over a path of `length_m`, m: every pose against the one that is nearest to that much further
-/// along the true path.
+/// Computes the relative pose error over a path of `length_m`, m.
 ///
-/// The selection of pairs is that of `evo_rpe --all_pairs --pairs_from_reference -u m`, the error of a pair that of
-/// [`relative_error`]. The path includes all motion of the head, also its swing.
+/// A pair is a pose and the one that is nearest to that much further along the true path. The selection of pairs is
+/// that of `evo_rpe --all_pairs --pairs_from_reference -u m`, the error of a pair that of [`relative_error`]. The path
+/// includes all motion of the head, also its swing.
 ///
 /// # Errors
 /// When no two pairs are `length_m` apart, within a tenth.

@@ -34,9 +34,10 @@ pub struct TrajectoryErrors {
 }
 
 impl TrajectoryErrors {
-    /// Computes the errors of `pairs`, and the absolute errors over time after a rigid alignment by the positions.
+    /// Computes the errors of `pairs`, and the absolute errors over time.
     ///
-    /// `truth` is the complete true trajectory, for the coverage.
+    /// The absolute errors are those after a rigid alignment by the positions. `truth` is the complete true trajectory,
+    /// for the coverage.
     ///
     /// # Errors
     /// When the positions cannot be aligned, or an error is not finite.
@@ -81,8 +82,9 @@ fn median(sorted: &[f64]) -> f64 {
     }
 }
 
-/// Interval between poses above which the trajectory has a gap, s: 1 s, or two median intervals of the sparser of the two
-/// trajectories that are compared, whose stamps these are.
+/// Returns the interval between poses above which a trajectory has a gap, s.
+///
+/// It is 1 s, or two median intervals of the sparser of the two trajectories that are compared, whose stamps these are.
 pub fn gap_s(stamps: &[Stamp]) -> f64 {
     median_interval(stamps).map_or(0.0, |interval| 2.0 * interval.seconds()).max(1.0)
 }

@@ -1,6 +1,8 @@
 //! Integrity of a run: error bounds, causes of the status and events, as in `metrics.json`.
 
 use serde::{Deserialize, Serialize};
+use zsim_base::time::Stamp;
+use zsim_estimation::{Event, Severity, grouped};
 
 /// All events of one kind: losses of measurements, or notes on the estimate.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -65,7 +67,46 @@ pub struct IntegrityMetrics {
     pub path_length_m: Option<f64>,
 }
 
+impl CauseMetrics {
+    /// Describes a cause, with times relative to `start`.
+    pub fn new(cause: &Event, start: Stamp) -> Self {
+        Self {
+            status: cause.severity.name().to_owned(),
+            kind: cause.kind.key().to_owned(),
+            from_s: cause.from.seconds_since(start),
+            to_s: cause.to.seconds_since(start),
+            sentence: cause.kind.to_string(),
+        }
+    }
+
+    /// Formats the cause as one line: message and interval of time.
+    pub fn line(&self) -> String {
+        format!("{}, {:.1} to {:.1} s", self.sentence, self.from_s, self.to_s)
+    }
+}
+
 impl EventMetrics {
+    /// Summarises the events of a severity, one entry for each kind, with times relative to `start`.
+    pub fn of(events: &[Event], severity: Severity, start: Stamp) -> Vec<Self> {
+        let summary = |group: Vec<&Event>| {
+            let times_s = || group.iter().map(|event| event.from.seconds_since(start));
+            Self {
+                kind: group[0].kind.key().to_owned(),
+                count: group.len() as u64,
+                first_s: times_s().min_by(f64::total_cmp),
+                last_s: times_s().max_by(f64::total_cmp),
+                worst: group[0].kind.magnitude(),
+                sentence: group[0].kind.to_string(),
+            }
+        };
+        grouped(events.iter().filter(|event| event.severity == severity)).into_iter().map(summary).collect()
+    }
+
+    /// Creates an entry for an event without a time.
+    pub fn without_time(kind: &str, sentence: String) -> Self {
+        Self { kind: kind.to_owned(), count: 1, sentence, ..Self::default() }
+    }
+
     /// Formats the events as one line: time, message and count.
     pub fn line(&self) -> String {
         let at = self.first_s.map_or_else(String::new, |s| format!("{s:.2} s: "));
@@ -81,6 +122,22 @@ impl EventMetrics {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use zsim_base::time::Span;
+    use zsim_estimation::EventKind;
+
+    #[test]
+    fn each_kind_is_one_entry_with_count_first_time_and_worst_case() {
+        let start = Stamp::from_nanos(5_000_000_000);
+        let gap = |at_s: f64, seconds: f64| Event::at(start + Span::from_seconds(at_s), EventKind::ImuGap { seconds });
+        let moved = Event::at(start, EventKind::StartedInMotion);
+        let events = [gap(3.0, 0.1), moved, gap(1.0, 0.3), gap(9.0, 0.2)];
+        let losses = EventMetrics::of(&events, Severity::Loss, start);
+        let [loss] = &losses[..] else { panic!("{losses:?}") };
+        assert_eq!((loss.kind.as_str(), loss.count, loss.worst), ("imu_gap", 3, Some(0.3)));
+        assert_eq!((loss.first_s, loss.last_s), (Some(1.0), Some(9.0)));
+        assert!(loss.sentence.contains("0.300 s"), "{}", loss.sentence);
+        assert_eq!(EventMetrics::of(&events, Severity::Note, start).len(), 1);
+    }
 
     #[test]
     fn events_of_one_kind_are_one_line() {

@@ -13,7 +13,7 @@ pub(super) fn verdict(metrics: &Metrics) -> Option<String> {
     let is_lost = status == "lost";
     let cause = integrity.causes.first().map(|cause| match is_lost {
         true => format!("{}, from {:.1} s", cause.sentence, cause.from_s),
-        false => format!("{}, {:.1} to {:.1} s", cause.sentence, cause.from_s, cause.to_s),
+        false => cause.line(),
     });
     let rmse_m = metrics.closed_loop.position_rmse_m.or(metrics.open_loop.position_rmse_m);
     let rmse = rmse_m.map(|m| format!("RMSE {}", length(m)));

@@ -9,7 +9,7 @@ use zsim_base::files::FileError;
 use zsim_base::geometry::{Pose, PoseCovariance, Trajectory, Vector};
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::{
-    ALIGNMENT_S, Cause, Evidence, Finding, Status, TURN_LEVER_M, Warning, WarningKind, WindowReport, bound_factors,
+    ALIGNMENT_S, Event, EventKind, Evidence, Severity, Status, TURN_LEVER_M, WindowReport, bound_factors,
     covariance_blocks, findings, radius_99,
 };
 use zsim_evaluation::{Errors, Pairs, align_poses};
@@ -78,8 +78,8 @@ fn bounds(run: &OpenLoopRun, trajectory: &Trajectory, covariances: &[(Stamp, Pos
 
 /// The distances that similar surfaces leave open after the relocalisations so far, in quadrature, m.
 fn ambiguities(run: &OpenLoopRun) -> Vec<(Stamp, f64)> {
-    let ambiguity = |warning: &Warning| match warning.kind {
-        WarningKind::Relocalised { ambiguity_m, .. } => Some((warning.stamp, ambiguity_m)),
+    let ambiguity = |warning: &Event| match warning.kind {
+        EventKind::Relocalised { ambiguity_m, .. } => Some((warning.from, ambiguity_m)),
         _ => None,
     };
     let sum = |sum_m: &mut f64, (stamp, ambiguity_m): (Stamp, f64)| {
@@ -100,21 +100,20 @@ fn aligned_error_ratio(trajectory: &Trajectory) -> f64 {
 ///
 /// The position is then that of the IMU, whose error has the predicted size.
 fn dead_reckoned_until(windows: &[WindowReport], aligned_until: Stamp) -> Option<Stamp> {
-    let is_unconstrained = |kind: &WarningKind| {
-        matches!(
-            kind,
-            WarningKind::WeakGeometry { .. } | WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }
-        )
-    };
     let aligned = windows.iter().take_while(|window| window.stamp <= aligned_until);
-    let unconstrained = aligned.filter(|window| window.moving && window.problem.as_ref().is_some_and(is_unconstrained));
+    let unconstrained = aligned.filter(|window| window.moving && window.problem.is_some());
     unconstrained.last().map(|window| window.stamp)
 }
 
-/// End of the interval of alignment with the truth: the first 20 s, or half of a run shorter than 40 s.
+/// Returns the duration of the alignment that the bounds refer to: 20 s, or half of a run of less than 40 s.
+pub(super) fn alignment_s(duration_s: f64) -> f64 {
+    ALIGNMENT_S.min(0.5 * duration_s)
+}
+
+/// End of the alignment.
 fn aligned_until(trajectory: &Trajectory) -> Option<Stamp> {
-    let (first, last) = (trajectory.stamps().first()?, trajectory.stamps().last()?);
-    Some(*first + Span::from_seconds(ALIGNMENT_S.min(0.5 * last.seconds_since(*first))))
+    let (first, last) = trajectory.span()?;
+    Some(first + Span::from_seconds(alignment_s(last.seconds_since(first))))
 }
 
 /// Computes the 99 % radii of the position error from the covariances, m.
@@ -140,10 +139,11 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     radii_m
 }
 
-/// Error bounds of a result and the findings that affect it.
+/// Error bounds of a result and the causes of its status.
 pub(super) struct Integrity {
     bounds: Vec<PoseBound>,
-    findings: Vec<Finding>,
+    causes: Vec<Event>,
+    path_length_m: f64,
 }
 
 impl Integrity {
@@ -151,32 +151,36 @@ impl Integrity {
     pub fn of(run: &OpenLoopRun, closed: Option<&ClosedLoopRun>, trajectory: &Trajectory) -> Self {
         let covariances = closed.map_or(&run.covariances, |closed| &closed.covariances);
         let mut bounds = bounds(run, trajectory, covariances);
-        let ends = |stamps: &[Stamp]| Some((*stamps.first()?, *stamps.last()?));
-        let estimated = ends(trajectory.stamps()).unwrap_or(run.recorded);
         let evidence = Evidence {
             windows: &run.windows,
             warnings: &run.warnings,
             samples: run.samples,
             recorded: run.recorded,
-            estimated,
+            estimated: trajectory.span().unwrap_or(run.recorded),
         };
-        let mut findings = findings(&evidence);
-        findings.extend(closed.and_then(|closed| moved_by_loop_closure(run, closed, &bounds)));
-        findings.extend(uncertain(&bounds, path_length_m(trajectory)));
-        findings.sort_by_key(|finding| std::cmp::Reverse(finding.status));
-        let lost = findings.iter().filter(|finding| finding.status == Status::Lost);
-        if let Some(lost_from) = lost.map(|finding| finding.from).min() {
+        let mut causes = findings(&evidence);
+        causes.extend(closed.and_then(|closed| moved_by_loop_closure(run, closed, &bounds)));
+        let path_length_m = path_length_m(trajectory);
+        causes.extend(uncertain(&bounds, path_length_m));
+        causes.sort_by_key(|cause| std::cmp::Reverse(cause.severity));
+        let lost = causes.iter().filter(|cause| cause.severity == Severity::Lost);
+        if let Some(lost_from) = lost.map(|cause| cause.from).min() {
             // The error is unbounded after tracking is lost, and everywhere if this happens during the alignment.
             let is_aligned = aligned_until(trajectory).is_some_and(|until| lost_from >= until);
             let from = if is_aligned { bounds.partition_point(|bound| bound.stamp < lost_from) } else { 0 };
             bounds[from..].iter_mut().for_each(|bound| bound.bound_m_99 = f64::INFINITY);
         }
-        Self { bounds, findings }
+        Self { bounds, causes, path_length_m }
     }
 
-    /// The status: the most severe finding.
+    /// Returns the status of the result.
     pub fn status(&self) -> Status {
-        self.findings.iter().map(|finding| finding.status).max().unwrap_or_default()
+        Status::of(&self.causes)
+    }
+
+    /// Returns the causes of the status, most severe first.
+    pub fn causes(&self) -> &[Event] {
+        &self.causes
     }
 
     /// Bounds and standard deviations of the poses, in order of time.
@@ -184,52 +188,40 @@ impl Integrity {
         &self.bounds
     }
 
-    /// Duration of the alignment that the bounds refer to: the first 20 s, or half of a run shorter than 40 s.
-    pub fn aligned_seconds(pairs: &Pairs) -> f64 {
-        ALIGNMENT_S.min(0.5 * pairs.duration_s())
-    }
-
-    /// The true errors after this alignment.
+    /// Computes the true errors after the alignment.
     pub fn aligned_errors(pairs: &Pairs) -> Option<Errors> {
-        let aligned = pairs.first_seconds(Self::aligned_seconds(pairs));
+        let aligned = pairs.first_seconds(alignment_s(pairs.duration_s()));
         let world_from_map = align_poses(aligned.truth(), aligned.estimate(), TURN_LEVER_M).ok()?;
         Some(Errors::after(pairs, &world_from_map))
     }
 
     /// The metrics of the result `trajectory` for `metrics.json`; `pairs` are the estimated and true poses, if the truth is known.
     pub fn metrics(&self, run: &OpenLoopRun, trajectory: &Trajectory, pairs: Option<&Pairs>) -> IntegrityMetrics {
-        let since = |stamp: Stamp| stamp.seconds_since(run.recorded.0);
-        let cause = |finding: &Finding| CauseMetrics {
-            status: finding.status.name().to_owned(),
-            kind: finding.cause.kind().to_owned(),
-            from_s: since(finding.from),
-            to_s: since(finding.to),
-            sentence: finding.cause.to_string(),
-        };
+        let causes: Vec<CauseMetrics> =
+            self.causes.iter().map(|cause| CauseMetrics::new(cause, run.recorded.0)).collect();
         let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
-        let all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
+        let mut all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
         let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
         let check = pairs.and_then(|pairs| self.check_bounds(pairs));
         IntegrityMetrics {
-            bound_m_99: median(all).and_then(finite),
+            bound_m_99: quantile(&mut all, 0.5).and_then(finite),
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
-            since_s: self.findings.iter().map(|finding| since(finding.from)).min_by(f64::total_cmp),
-            causes: self.findings.iter().map(cause).collect(),
+            since_s: causes.iter().map(|cause| cause.from_s).min_by(f64::total_cmp),
+            causes,
             within_bound: check.map(|check| check.fraction_within),
             bound_over_error: check.and_then(|check| finite(check.bound_over_error)),
             aligned_rmse_m: check.map(|check| check.rmse_m),
             largest_error_m: check.map(|check| check.largest_m),
-            path_length_m: Some(path_length_m(trajectory)),
+            path_length_m: Some(self.path_length_m),
             aligned_p95_m: check.map(|check| check.p95_m),
             degraded_fraction: self.degraded_fraction(trajectory),
         }
     }
 
-    /// Computes the fraction of the time of `trajectory` in which a finding affects it; `None` without two poses.
+    /// Computes the fraction of the time of `trajectory` in which a cause degrades it; `None` without two poses.
     fn degraded_fraction(&self, trajectory: &Trajectory) -> Option<f64> {
-        let (first, last) = (*trajectory.stamps().first()?, *trajectory.stamps().last()?);
-        let mut intervals: Vec<(Stamp, Stamp)> =
-            self.findings.iter().map(|finding| (finding.from, finding.to)).collect();
+        let (first, last) = trajectory.span()?;
+        let mut intervals: Vec<(Stamp, Stamp)> = self.causes.iter().map(|cause| (cause.from, cause.to)).collect();
         intervals.sort_unstable();
         let (mut until, mut degraded_s) = (first, 0.0);
         for (from, to) in intervals {
@@ -262,7 +254,7 @@ impl Integrity {
         }
         Some(BoundCheck {
             fraction_within: within as f64 / ratios.len() as f64,
-            bound_over_error: median(ratios)?,
+            bound_over_error: quantile(&mut ratios, 0.5)?,
             rmse_m: errors.position_rmse_m(),
             p95_m: quantile(&mut errors_m, 0.95)?,
             largest_m: *errors_m.last()?,
@@ -295,10 +287,6 @@ struct BoundCheck {
     largest_m: f64,
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    quantile(&mut values, 0.5)
-}
-
 /// Sorts `values`; returns the first that is above the fraction `at` of them, `None` without values.
 fn quantile(values: &mut [f64], at: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
@@ -329,22 +317,22 @@ pub fn large_error_m(path_m: f64) -> f64 {
 }
 
 /// The interval in which the bound exceeds the limit of a usable result, or else of a good result.
-fn uncertain(bounds: &[PoseBound], path_m: f64) -> Option<Finding> {
-    let lost = above_limit(bounds, LOST_FACTOR * large_error_m(path_m), Status::Lost);
-    lost.or_else(|| above_limit(bounds, large_error_m(path_m), Status::Degraded))
+fn uncertain(bounds: &[PoseBound], path_m: f64) -> Option<Event> {
+    let lost = above_limit(bounds, LOST_FACTOR * large_error_m(path_m), Severity::Lost);
+    lost.or_else(|| above_limit(bounds, large_error_m(path_m), Severity::Degraded))
 }
 
 /// The interval from the first to the last pose with a bound above `limit_m`.
-fn above_limit(bounds: &[PoseBound], limit_m: f64, status: Status) -> Option<Finding> {
+fn above_limit(bounds: &[PoseBound], limit_m: f64, severity: Severity) -> Option<Event> {
     let is_large = |bound: &&PoseBound| bound.bound_m_99 > limit_m;
     let from = bounds.iter().find(is_large)?.stamp;
     let to = bounds.iter().rev().find(is_large)?.stamp;
     let bound_m = bounds.iter().map(|bound| bound.bound_m_99).fold(0.0, f64::max);
-    Some(Finding { status, cause: Cause::Uncertain { bound_m }, from, to })
+    Some(Event { from, to, severity, kind: EventKind::Uncertain { bound_m } })
 }
 
 /// The interval in which the loop closure moved the trajectory by more than the error bound.
-fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Finding> {
+fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Event> {
     let open = closed.open_loop_recalibrated.as_ref().unwrap_or(&run.map_from_head);
     let shift = |((stamp, a), (_, b)): ((Stamp, &Pose), (Stamp, &Pose))| {
         (stamp, (a.translation.vector - b.translation.vector).norm())
@@ -356,7 +344,7 @@ fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[Po
         .collect();
     let (from, to) = (moved.first()?.0, moved.last()?.0);
     let moved_m = moved.iter().map(|(_, moved_m)| *moved_m).fold(0.0, f64::max);
-    Some(Finding { status: Status::Degraded, cause: Cause::LoopClosure { moved_m }, from, to })
+    Some(Event::over(from, to, EventKind::LoopClosure { moved_m }))
 }
 
 /// Writes `windows.csv` to `folder`.
@@ -364,7 +352,7 @@ pub(super) fn write_windows(folder: &Path, windows: &[WindowReport]) -> Result<(
     let header = "stamp_s,surfels,matches,view_matches,views,residual_rms_m,iterations,last_correction_m,conditioning,imu_contradiction,\
                   clock_offset_s,clock_rate,range_correction_m,imu_matrix,moving,trouble";
     let rows = windows.iter().map(|w| {
-        let problem = w.problem.as_ref().map_or("", |kind| kind.name());
+        let problem = w.problem.as_ref().map_or("", EventKind::key);
         format!(
             "{},{},{},{},{},{:.6},{},{:.6},{:.3e},{:.4},{:.9},{:.3e},{:.6},{:.3e},{},{problem}",
             seconds(w.stamp),
@@ -410,17 +398,14 @@ mod tests {
     #[test]
     fn overlapping_causes_degrade_a_time_once() {
         let at = |s: f64| Stamp::from_nanos(0) + Span::from_seconds(s);
-        let finding = |from: f64, to: f64| Finding {
-            status: Status::Degraded,
-            cause: Cause::NotRelocalised,
-            from: at(from),
-            to: at(to),
-        };
+        let cause = |from: f64, to: f64| Event::over(at(from), at(to), EventKind::UnknownOffset);
         let trajectory = Trajectory::from_poses([0.0, 20.0].map(|s| (at(s), Pose::identity()))).unwrap();
-        let degraded = |findings| Integrity { bounds: Vec::new(), findings }.degraded_fraction(&trajectory).unwrap();
+        let degraded = |causes| {
+            Integrity { bounds: Vec::new(), causes, path_length_m: 0.0 }.degraded_fraction(&trajectory).unwrap()
+        };
         assert_eq!(degraded(Vec::new()), 0.0);
         // 2 to 8 s, and 15 s to the end.
-        let findings = vec![finding(15.0, 30.0), finding(4.0, 8.0), finding(2.0, 6.0), finding(5.0, 5.5)];
-        assert!((degraded(findings) - 0.55).abs() < 1e-9);
+        let causes = vec![cause(15.0, 30.0), cause(4.0, 8.0), cause(2.0, 6.0), cause(5.0, 5.5)];
+        assert!((degraded(causes) - 0.55).abs() < 1e-9);
     }
 }

@@ -19,7 +19,6 @@ mod disk;
 mod error;
 mod estimate;
 mod estimated_run;
-mod events;
 mod full_run;
 mod inputs;
 mod integrity;

@@ -72,7 +72,7 @@ impl LoopInputs<'_> {
             OpenLoopOptions { estimator, calibration, recording_surfels: self.closes_loops || self.keeps_surfels, map };
         let tum = self.folder.map(|folder| folder.join("open_loop.tum"));
         let open = run_open_loop(reader, selection, options, tum.as_deref(), self.expected_s, watch)?;
-        open.events.notes.iter().for_each(|note| watch.note(&note.line()));
+        open.notes.iter().for_each(|note| watch.note(&note.line()));
         let closed = self.closes_loops.then(|| self.close(&open, watch)).transpose()?;
         watch.progress(Stage::Evaluating, 0.0, None);
         let truth = if self.has_truth { SampledTruth::read(reader, &open, bound)? } else { None };
@@ -144,8 +144,8 @@ impl Loops {
             duration_s: self.open.acquisition_s,
             status: Some(integrity.status().name().to_owned()),
             integrity: integrity.metrics(&self.open, self.best().map_from_head, pairs),
-            losses: self.open.events.losses.clone(),
-            notes: self.open.events.notes.clone(),
+            losses: self.open.losses.clone(),
+            notes: self.open.notes.clone(),
             open_loop: comparison::open_loop_metrics(&self.open, self.comparison.as_ref()),
             closed_loop: closed_loop.unwrap_or_default(),
             clock: comparison::clock_metrics(&self.open, self.truth.as_ref()),

@@ -1,9 +1,9 @@
 //! Open-loop estimation from a recording, as it would run online.
 
 use super::cadence::Cadence;
-use super::events::Events;
 use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{MapOptions, ProgressMonitor, RunError, Stage, StageData};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -13,11 +13,12 @@ use zsim_base::measurement::{Calibration, LidarCorrection, Measurement};
 use zsim_base::parallel::Stopped;
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, ObservedSurfels, Timing, Warning, WindowReport,
-    covariance_blocks, radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, Event, Evidence, LocalisedPose, ObservedSurfels, OpenLoop, Severity,
+    Timing, WindowReport, covariance_blocks, radius_99,
 };
 use zsim_evaluation::{DeadReckoning, EvaluationError, RestDetection};
-use zsim_recording::{Reader, RecordingError, Selection, TumWriter};
+use zsim_recording::{ClockStep, Loss, Reader, RecordingError, Selection, TumWriter};
+use zsim_report::EventMetrics;
 
 /// Number of measurements between progress reports: about 1 s of data.
 const PROGRESS_INTERVAL: usize = 200;
@@ -41,14 +42,16 @@ pub(super) struct OpenLoopRun {
     pub lidar: LidarCorrection,
     /// The same correction along the IMU axes, as in a calibration file.
     pub calibrated_lidar: LidarCorrection,
-    /// Losses and notes.
-    pub events: Events,
+    /// Missing or unused measurements, and intervals without an estimate.
+    pub losses: Vec<EventMetrics>,
+    /// Other information for the user.
+    pub notes: Vec<EventMetrics>,
     /// Number of IMU samples in the recording.
     pub samples: usize,
     /// Reports of the windows, in order of time.
     pub windows: Vec<WindowReport>,
     /// Warnings of the estimator, in order of time.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<Event>,
     /// First and last stamp of the recording's measurements.
     pub recorded: (Stamp, Stamp),
     /// Number of lidar returns in the recording.
@@ -122,15 +125,8 @@ pub(super) fn run_open_loop(
             .map(|step| if step.topic == selection.imu_topic { step.by } else { Span::ZERO - step.by }.seconds())
             .sum::<f64>()
     };
-    let mut events = Events::default();
-    loss.sentences().into_iter().for_each(|sentence| events.add_loss("recording", sentence));
-    inputs.imu.missing("IMU samples").into_iter().for_each(|sentence| events.add_loss("missing_samples", sentence));
-    inputs.lidar.missing("scans").into_iter().for_each(|sentence| events.add_loss("missing_scans", sentence));
-    result.located.iter().for_each(|located| events.add_note("located", located_message(located)));
-    loss.notes().into_iter().for_each(|sentence| events.add_note("recording", sentence));
     let start = inputs.start();
-    events.add_clock_steps(&loss.clock_steps, start);
-    events.add_warnings(&result.warnings, start);
+    let (losses, notes) = losses_and_notes(&result, &loss, &inputs);
     Ok(OpenLoopRun {
         map_from_head,
         covariances,
@@ -140,7 +136,8 @@ pub(super) fn run_open_loop(
         clock_offsets: result.clock_offsets.into_iter().map(|(at, s)| (at, s - shift_s + stepped_s(at))).collect(),
         lidar: result.lidar,
         calibrated_lidar: result.calibrated_lidar,
-        events,
+        losses,
+        notes,
         samples: inputs.imu.count(),
         recorded: (start, start + Span::from_seconds(inputs.seconds())),
         windows: result.windows,
@@ -193,6 +190,37 @@ fn located_message(located: &LocalisedPose) -> String {
         100.0 * located.inlier_ratio,
         1e3 * located.residual_rms_m
     )
+}
+
+/// Lists the losses and the notes of the reader and of the estimator.
+fn losses_and_notes(result: &OpenLoop, loss: &Loss, inputs: &InputSummary) -> (Vec<EventMetrics>, Vec<EventMetrics>) {
+    let start = inputs.start();
+    let all = |kind, sentences: Vec<String>| sentences.into_iter().map(move |s| EventMetrics::without_time(kind, s));
+    let losses = all("recording", loss.sentences())
+        .chain(all("missing_samples", inputs.imu.missing("IMU samples").into_iter().collect()))
+        .chain(all("missing_scans", inputs.lidar.missing("scans").into_iter().collect()))
+        .chain(EventMetrics::of(&result.warnings, Severity::Loss, start));
+    let notes = all("located", result.located.iter().map(located_message).collect())
+        .chain(all("recording", loss.notes()))
+        .chain(clock_steps(&loss.clock_steps, start))
+        .chain(EventMetrics::of(&result.warnings, Severity::Note, start));
+    (losses.collect(), notes.collect())
+}
+
+/// Describes the steps of the sensors' clocks, with times relative to `start`.
+fn clock_steps(steps: &[ClockStep], start: Stamp) -> Option<EventMetrics> {
+    // Two sensors of one clock step once.
+    let mut counts = BTreeMap::<&str, u64>::new();
+    steps.iter().for_each(|step| *counts.entry(&step.topic).or_default() += 1);
+    let times_s = || steps.iter().map(|step| step.at.seconds_since(start));
+    Some(EventMetrics {
+        kind: "clock_step".to_owned(),
+        count: counts.into_values().max()?,
+        first_s: times_s().min_by(f64::total_cmp),
+        last_s: times_s().max_by(f64::total_cmp),
+        worst: Some(ClockStep::largest(steps)?.by.seconds().abs()),
+        sentence: ClockStep::sentence(steps)?,
+    })
 }
 
 /// Poses in memory, and in a TUM file if requested.

@@ -1,9 +1,7 @@
 //! The estimator on closed-form walks: accuracy, repeatability, and imperfect recordings.
 
 use crate::estimation::fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{
-    Discarded, EstimationError, Estimator, EstimatorSpec, OpenLoop, WarningKind, estimate_all, load,
-};
+use zsim::estimation::{EstimationError, Estimator, EstimatorSpec, EventKind, OpenLoop, estimate_all, load};
 use zsim::geometry::{Pose, Vector, from_roll_pitch_yaw};
 use zsim::measurement::Measurement;
 use zsim::time::{Span, Stamp};
@@ -176,7 +174,7 @@ fn a_start_in_motion_is_reported_and_estimated() {
     let mut run = hall(9, 12.0);
     run.walk.start_s = -10.0;
     let result = estimate(run.measurements());
-    assert!(result.warnings.iter().any(|w| w.kind == WarningKind::StartedInMotion), "{:?}", result.warnings);
+    assert!(result.warnings.iter().any(|w| w.kind == EventKind::StartedInMotion), "{:?}", result.warnings);
     let score = Score::of(&result, &run);
     assert!(score.rmse_m < 0.002, "{score:?}");
 }
@@ -197,16 +195,16 @@ fn lossy(seed: u64, is_lost: impl Fn(&Measurement) -> bool) -> (OpenLoop, Score)
     (result, score)
 }
 
-fn warned(result: &OpenLoop, of: fn(&WarningKind) -> bool) -> usize {
+fn warned(result: &OpenLoop, of: fn(&EventKind) -> bool) -> usize {
     result.warnings.iter().filter(|warning| of(&warning.kind)).count()
 }
 
 #[test]
 fn after_a_gap_of_two_seconds_the_head_is_relocalised() {
     let (result, score) = lossy(12, |m| (6.0..8.0).contains(&seconds(m)));
-    let gap = |kind: &WarningKind| matches!(kind, WarningKind::Restarted { seconds } if (1.9..2.1).contains(seconds));
+    let gap = |kind: &EventKind| matches!(kind, EventKind::Restarted { seconds } if (1.9..2.1).contains(seconds));
     assert_eq!(warned(&result, gap), 1, "{:?}", result.warnings);
-    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. })), 1, "{:?}", result.warnings);
+    assert_eq!(warned(&result, |kind| matches!(kind, EventKind::Relocalised { .. })), 1, "{:?}", result.warnings);
     assert!(result.trajectory.span().unwrap().1 > Stamp::from_nanos(13_500_000_000));
     // There are no poses during the gap.
     let silence = Stamp::from_nanos(6_200_000_000)..Stamp::from_nanos(7_900_000_000);
@@ -222,8 +220,8 @@ fn the_relocalisation_waits_until_there_are_enough_data() {
         _ => (6.0..12.0).contains(&seconds(m)),
     };
     let (result, score) = lossy(12, is_lost);
-    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::TooShortToRelocalise { .. })), 1);
-    assert_eq!(warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. })), 1, "{:?}", result.warnings);
+    assert_eq!(warned(&result, |kind| matches!(kind, EventKind::TooShortToRelocalise { .. })), 1);
+    assert_eq!(warned(&result, |kind| matches!(kind, EventKind::Relocalised { .. })), 1, "{:?}", result.warnings);
     assert!(score.worst_m < 0.08, "{score:?}");
 }
 
@@ -232,7 +230,7 @@ fn short_gaps_of_the_imu_are_bridged() {
     for (seed, gap_s) in [(15, 0.06), (16, 0.1)] {
         let silent = |t_s: f64| [5.2, 8.3, 10.9].iter().any(|from_s| (*from_s..from_s + gap_s).contains(&t_s));
         let (result, score) = lossy(seed, |m| matches!(m, Measurement::Imu(_)) && silent(seconds(m)));
-        let count = warned(&result, |kind| matches!(kind, WarningKind::ImuGap { .. }));
+        let count = warned(&result, |kind| matches!(kind, EventKind::ImuGap { .. }));
         assert_eq!(count, 3, "{:?}", result.warnings);
         assert!(score.rmse_m < 0.0085, "{gap_s} s: {score:?}");
     }
@@ -244,9 +242,9 @@ fn a_longer_gap_of_the_imu_is_bridged_if_the_motion_is_slow_enough_else_the_head
     for (seed, gap_s, relocalised) in [(15, 0.15, 0), (16, 0.55, 1), (17, 1.0, 1)] {
         let is_silent = |m: &Measurement| (6.2..6.2 + gap_s).contains(&seconds(m));
         let (result, score) = lossy(seed, |m| matches!(m, Measurement::Imu(_)) && is_silent(m));
-        let count = warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. }));
+        let count = warned(&result, |kind| matches!(kind, EventKind::Relocalised { .. }));
         assert_eq!(count, relocalised, "{gap_s} s: {:?}", result.warnings);
-        let count = warned(&result, |kind| matches!(kind, WarningKind::ImuGap { .. }));
+        let count = warned(&result, |kind| matches!(kind, EventKind::ImuGap { .. }));
         assert_eq!(count, 1 - relocalised, "{gap_s} s: {:?}", result.warnings);
         assert!(score.worst_m < 0.022, "{gap_s} s: {score:?}");
     }
@@ -261,7 +259,7 @@ fn imu_is_silent(measurement: &Measurement, gaps: &[(f64, f64)]) -> bool {
 #[test]
 fn data_after_a_gap_that_are_too_few_to_relocalise_have_no_estimate() {
     let (result, score) = lossy(12, |m| imu_is_silent(m, &[(12.6, 13.6)]));
-    let short = |kind: &WarningKind| matches!(kind, WarningKind::TooShortToRelocalise { seconds } if *seconds < 0.5);
+    let short = |kind: &EventKind| matches!(kind, EventKind::TooShortToRelocalise { seconds } if *seconds < 0.5);
     assert_eq!(warned(&result, short), 1, "{:?}", result.warnings);
     let end = result.trajectory.span().unwrap().1;
     assert!(end <= Stamp::from_nanos(12_600_000_000), "{end:?}");
@@ -272,9 +270,9 @@ fn data_after_a_gap_that_are_too_few_to_relocalise_have_no_estimate() {
 fn a_second_gap_soon_after_the_first_does_not_end_the_relocalisation() {
     for second in [(7.6, 8.4), (9.0, 9.8)] {
         let (result, score) = lossy(12, |m| imu_is_silent(m, &[(6.2, 7.2), second]));
-        assert!(warned(&result, |kind| matches!(kind, WarningKind::Relocalised { .. })) >= 1, "{:?}", result.warnings);
+        assert!(warned(&result, |kind| matches!(kind, EventKind::Relocalised { .. })) >= 1, "{:?}", result.warnings);
         assert_eq!(
-            warned(&result, |kind| matches!(kind, WarningKind::NotRelocalised { .. })),
+            warned(&result, |kind| matches!(kind, EventKind::NotRelocalised { .. })),
             0,
             "{:?}",
             result.warnings
@@ -293,7 +291,7 @@ fn a_clock_jump_of_a_quarter_of_an_hour_is_a_long_gap() {
         }
     }
     let result = estimate(measurements);
-    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::Restarted { .. })), "{:?}", result.warnings);
+    assert!(result.warnings.iter().any(|w| matches!(w.kind, EventKind::Restarted { .. })), "{:?}", result.warnings);
     let end = result.trajectory.span().unwrap().1;
     assert!(end > Stamp::from_nanos(1_008_000_000_000), "{end:?}");
     assert!(result.trajectory.len() < 900, "{}", result.trajectory.len());
@@ -308,7 +306,7 @@ fn measurements_with_decreasing_stamps_are_dropped_with_a_warning() {
         }
     }
     let result = estimate(measurements);
-    let discarded = |kind: &WarningKind| matches!(kind, WarningKind::Discarded { count, .. } if *count > 50);
+    let discarded = |kind: &EventKind| matches!(kind, EventKind::LateSamples { count } if *count > 50);
     assert!(result.warnings.iter().any(|w| discarded(&w.kind)), "{:?}", result.warnings);
     assert!(result.trajectory.len() > 300);
 }
@@ -324,7 +322,7 @@ fn without_lidar_returns_the_imu_is_integrated_with_a_warning() {
     let result = estimate(measurements);
     assert!(result.trajectory.len() > 700);
     assert!(result.windows.iter().all(|window| window.matches == 0));
-    let lost = |kind: &WarningKind| matches!(kind, WarningKind::Lost { seconds, of_seconds } if seconds <= of_seconds);
+    let lost = |kind: &EventKind| matches!(kind, EventKind::Lost { seconds, of_seconds } if seconds <= of_seconds);
     assert!(result.warnings.iter().any(|w| lost(&w.kind)), "{:?}", result.warnings);
 }
 
@@ -377,9 +375,9 @@ fn bias_and_noise_above_specification_are_estimated_at_rest() {
     let mut raised = calibration();
     raised.imu.gyro_turn_on_bias_rad_per_s = 0.02;
     let result = estimate_all(&spec(), &raised, measurements.into_iter()).unwrap();
-    let noisy = |kind: &WarningKind| matches!(kind, WarningKind::NoisyImu { gyro, .. } if (2.0..6.0).contains(gyro));
+    let noisy = |kind: &EventKind| matches!(kind, EventKind::NoisyImu { gyro, .. } if (2.0..6.0).contains(gyro));
     assert!(result.warnings.iter().any(|w| noisy(&w.kind)), "{:?}", result.warnings);
-    assert!(!result.warnings.iter().any(|w| w.kind == WarningKind::StartedInMotion), "{:?}", result.warnings);
+    assert!(!result.warnings.iter().any(|w| w.kind == EventKind::StartedInMotion), "{:?}", result.warnings);
     let score = Score::of(&result, &run);
     // Worst of ten seeds: 3.9 mm.
     assert!(score.worst_m < 0.012, "{score:?}");
@@ -390,7 +388,7 @@ fn after_loss_of_the_lidar_the_imu_is_integrated_with_a_warning() {
     let all = hall(16, 10.0).measurements();
     let kept = all.into_iter().filter(|m| matches!(m, Measurement::Imu(_)) || seconds(m) < 6.0).collect();
     let result = estimate(kept);
-    assert!(result.warnings.iter().any(|w| matches!(w.kind, WarningKind::LidarGap { .. })), "{:?}", result.warnings);
+    assert!(result.warnings.iter().any(|w| matches!(w.kind, EventKind::LidarGap { .. })), "{:?}", result.warnings);
     // The estimate stops after three seconds without lidar.
     let end_s = result.trajectory.span().unwrap().1.nanos() as f64 * 1e-9;
     assert!((8.5..9.6).contains(&end_s), "{end_s}");
@@ -442,8 +440,7 @@ fn an_outlier_sample_is_removed() {
         sample.angular_velocity_rad_per_s.x += rate;
         sample.specific_force_m_per_s2.y += force;
         let result = estimate(measurements);
-        let counted =
-            |kind: &WarningKind| matches!(kind, WarningKind::Discarded { what: Discarded::Outliers, count: 1 });
+        let counted = |kind: &EventKind| matches!(kind, EventKind::Outliers { count: 1 });
         assert_eq!(warned(&result, counted), 1, "{rate}, {force}: {:?}", result.warnings);
         let score = Score::of(&result, &run);
         assert!(score.worst_m < 0.008, "{rate}, {force}: {score:?}");

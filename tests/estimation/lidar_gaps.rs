@@ -1,7 +1,7 @@
 //! Gaps of the lidar in which the estimate stops and the IMU goes on.
 
 use crate::estimation::fixture::{Room, Run, Score, Walk, calibration};
-use zsim::estimation::{WarningKind, estimate_all, load};
+use zsim::estimation::{EventKind, estimate_all, load};
 use zsim::measurement::Measurement;
 
 /// The walk turns by 270 degrees while the lidar is silent for 7 s: only the IMU shows from where the hall is seen again.
@@ -16,8 +16,8 @@ fn after_seven_seconds_without_the_lidar_the_head_is_found_where_the_imu_predict
         };
         let measurements = run.measurements().into_iter().filter(|measurement| !is_silent(measurement));
         let result = estimate_all(&load("default").unwrap(), &calibration(), measurements).unwrap();
-        let ambiguity_m = |kind: &WarningKind| match kind {
-            WarningKind::Relocalised { ambiguity_m, .. } => Some(*ambiguity_m),
+        let ambiguity_m = |kind: &EventKind| match kind {
+            EventKind::Relocalised { ambiguity_m, .. } => Some(*ambiguity_m),
             _ => None,
         };
         let relocalised: Vec<f64> = result.warnings.iter().filter_map(|warning| ambiguity_m(&warning.kind)).collect();

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 use zsim::estimation::{
-    EstimatedPose, EstimationError, Estimator, EstimatorSpec, OpenLoop, RegistrationInput, WarningKind,
+    EstimatedPose, EstimationError, Estimator, EstimatorSpec, EventKind, OpenLoop, RegistrationInput,
 };
 use zsim::estimation::{load, locate_map, map_of, merge_maps, register};
 use zsim::evaluation::{Errors, Pairs};
@@ -182,8 +182,8 @@ fn after_a_gap_the_head_is_relocalised_in_the_map() {
     let gapped = Session { measurements: kept, calibration: second.calibration.clone(), truth: second.truth.clone() };
     let start = second.start_in(&first.world_from_map);
     let run = gapped.estimate(Some((&first.map, &start))).unwrap();
-    assert!(run.warnings.iter().any(|w| matches!(w.kind, WarningKind::Restarted { .. })), "{:?}", run.warnings);
-    assert!(!run.warnings.iter().any(|w| w.kind == WarningKind::LostInMap), "{:?}", run.warnings);
+    assert!(run.warnings.iter().any(|w| matches!(w.kind, EventKind::Restarted { .. })), "{:?}", run.warnings);
+    assert!(!run.warnings.iter().any(|w| w.kind == EventKind::LostInMap), "{:?}", run.warnings);
     let behind = run.trajectory.iter().filter(|(stamp, _)| *stamp > silence.end + Span::from_seconds(1.0));
     let behind = Trajectory::from_poses(behind.map(|(stamp, pose)| (stamp, *pose))).unwrap();
     let rmse_m = second.error_in(&behind, &first.world_from_map).position_rmse_m();

@@ -1,9 +1,8 @@
 //! Search for specs: as a path, in `scenes/` and `specs/` of the working directory, in the binary.
 
-use super::{Source, SpecError, Tree};
+use super::{Source, SpecError};
 use crate::similar::did_you_mean;
 use include_dir::Dir;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use zsim_scenes::SCENES;
 use zsim_specs::SPECS;
@@ -165,31 +164,6 @@ fn help(kind: Kind, name: &str) -> String {
     format!("{question}built in are: {}", names.join(", "))
 }
 
-/// Returns the kind of spec that has the most of the outermost `keys` of a text, the first of several.
-///
-/// The keys of a kind are those of its built-in specs.
-pub fn kind_by_keys(keys: &[String]) -> Option<KindByKeys> {
-    let known = |kind: Kind| {
-        let texts = folder_in_binary(kind).into_iter().flat_map(Dir::files).filter_map(|file| file.contents_utf8());
-        let of_each = texts.filter_map(|text| Tree::read(&Source::in_memory("", text)).ok());
-        let known: BTreeSet<String> = of_each.flat_map(|tree| tree.keys()).collect();
-        keys.iter().filter(|key| known.contains(*key)).count()
-    };
-    let matching = Kind::ALL.into_iter().map(|kind| (kind, known(kind)));
-    // The first of equal ones: `max_by_key` returns the last.
-    let (kind, count) = matching.rev().max_by_key(|(_, count)| *count)?;
-    (count > 0).then_some(KindByKeys { kind, has_all: count == keys.len() })
-}
-
-/// A kind of spec, guessed from keys.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KindByKeys {
-    /// The kind that has the most of the keys.
-    pub kind: Kind,
-    /// Whether it has all of them.
-    pub has_all: bool,
-}
-
 /// The spec in the binary with the file name `file`, such as `default.ron`.
 pub fn built_in(kind: Kind, file: &str) -> Option<Source> {
     let inside = folder_in_binary(kind)?.files().find(|entry| file_name(entry) == Some(file))?;
@@ -221,7 +195,7 @@ pub fn names(kind: Kind) -> Vec<String> {
     names
 }
 
-fn folder_in_binary(kind: Kind) -> Option<&'static Dir<'static>> {
+pub(super) fn folder_in_binary(kind: Kind) -> Option<&'static Dir<'static>> {
     match kind.folder().strip_prefix("specs/") {
         None => Some(&SCENES),
         Some(sub) => SPECS.get_dir(sub),

@@ -1,6 +1,5 @@
 //! The keys that a text lacks.
 
-use super::tree::needs;
 use serde_json::Value;
 
 /// A struct or variant without a key that it needs.
@@ -19,8 +18,8 @@ pub(super) struct Missing {
 }
 
 impl Missing {
-    /// The message that names all keys that are missing; `schema` is that of the whole spec.
-    pub fn message(&self, schema: &Value) -> String {
+    /// All keys that are missing; `schema` is that of the whole spec.
+    pub fn keys<'s>(&'s self, schema: &'s Value) -> Vec<&'s str> {
         let required = self.required(schema).unwrap_or_default();
         let is_missing = |key: &&str| *key == self.key || !self.present.iter().any(|present| present == *key);
         let mut keys: Vec<&str> =
@@ -28,7 +27,7 @@ impl Missing {
         if keys.is_empty() {
             keys.push(self.key);
         }
-        needs(&self.owner, &keys)
+        keys
     }
 
     /// The required keys of the struct in `schema` that has exactly the known keys.

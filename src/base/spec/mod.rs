@@ -7,6 +7,7 @@
 
 pub mod checked;
 mod error;
+mod guess;
 mod library;
 mod missing;
 mod named;
@@ -17,9 +18,8 @@ mod writer;
 
 pub use crate::unit::split_unit;
 pub use error::SpecError;
-pub use library::{
-    Kind, KindByKeys, MAX_SPEC_BYTES, built_in, find, find_from, kind_by_keys, name_from, names, text_file,
-};
+pub use guess::{KindByKeys, kind_by_keys};
+pub use library::{Kind, MAX_SPEC_BYTES, built_in, find, find_from, name_from, names, text_file};
 pub use named::{Named, NamedSpec};
 pub use position::Position;
 pub use source::Source;
@@ -29,6 +29,7 @@ pub use writer::to_json;
 use missing::Missing;
 use schemars::schema_for;
 use serde::de::DeserializeOwned;
+use tree::needs;
 
 /// Parses the text of a spec.
 ///
@@ -65,7 +66,8 @@ pub fn parse_over<T: DeserializeOwned>(source: &Source, defaults: Option<&Tree>)
 pub fn parse_named<T: NamedSpec>(source: &Source) -> Result<T, SpecError> {
     parse(source).map_err(|error: SpecError| match error.missing() {
         Some(missing) => {
-            let message = missing.message(schema_for!(T).as_value());
+            let schema = schema_for!(T);
+            let message = needs(&missing.owner, &missing.keys(schema.as_value()));
             let help = format!("`zsim spec reference {}` lists the keys", T::KIND.key());
             error.with_message(message).with_help(help)
         }

@@ -4,7 +4,8 @@ use std::time::{Duration, Instant};
 use zsim_base::geometry::{Pose, Vector};
 use zsim_base::measurement::LidarScan;
 use zsim_base::time::{Span, Stamp};
-use zsim_estimation::{EstimatedPose, Evidence, Finding, Status, Warning, findings};
+use zsim_estimation::{EstimatedPose, Event, Evidence, Status, findings};
+use zsim_report::CauseMetrics;
 use zsim_report::page::LiveVerdict;
 use zsim_run::{RunEvent, Stage, StageData};
 
@@ -39,8 +40,8 @@ pub(super) enum Frame {
     Scan(Vec<Return>),
     /// Estimated poses `map_from_head`.
     Poses(Vec<(Stamp, Pose)>),
-    /// The verdict so far, and the events with their stamps.
-    Verdict { verdict: LiveVerdict, events: Vec<(Stamp, String)> },
+    /// The verdict so far, and the newest warnings.
+    Verdict { verdict: LiveVerdict, warnings: Vec<Event> },
 }
 
 impl Frame {
@@ -91,20 +92,18 @@ impl Framer {
         }
         self.last_verdict = Some(Instant::now());
         let newest = evidence.warnings.len().saturating_sub(MAX_EVENTS);
-        let event = |warning: &Warning| (warning.stamp, warning.kind.to_string());
-        let events = evidence.warnings[newest..].iter().map(event).collect();
-        Some(Frame::Verdict { verdict: verdict(&findings(evidence), evidence.recorded.0), events })
+        let verdict = verdict(&findings(evidence), evidence.recorded.0);
+        Some(Frame::Verdict { verdict, warnings: evidence.warnings[newest..].to_vec() })
     }
 }
 
-/// The verdict of the most severe finding; times are relative to `start`.
-pub(crate) fn verdict(findings: &[Finding], start: Stamp) -> LiveVerdict {
-    let Some(worst) = findings.iter().max_by_key(|finding| finding.status) else {
+/// Returns the verdict of the most severe cause; times are relative to `start`.
+pub(crate) fn verdict(causes: &[Event], start: Stamp) -> LiveVerdict {
+    let Some(worst) = causes.iter().max_by_key(|cause| cause.severity) else {
         return LiveVerdict { status: Status::default().name().to_owned(), reason: "no problem so far".to_owned() };
     };
-    let [from_s, to_s] = [worst.from, worst.to].map(|stamp| stamp.seconds_since(start));
-    let reason = format!("{}, {from_s:.1} to {to_s:.1} s (so far)", worst.cause);
-    LiveVerdict { status: worst.status.name().to_owned(), reason }
+    let cause = CauseMetrics::new(worst, start);
+    LiveVerdict { reason: cause.line() + " (so far)", status: cause.status }
 }
 
 fn thinned(scan: &LidarScan) -> Vec<Return> {

@@ -7,6 +7,7 @@ use super::path::{GrowingPath, RecentPoses};
 use std::collections::VecDeque;
 use zsim_base::geometry::{Pose, Vector};
 use zsim_base::time::Stamp;
+use zsim_estimation::Event;
 use zsim_report::page::{LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TimedPose, TruePoses, Volume};
 use zsim_run::Stage;
 
@@ -32,14 +33,6 @@ pub(super) struct PageState {
     pub next_scan: u64,
 }
 
-/// A warning of the estimator.
-#[derive(Debug, Clone, PartialEq)]
-struct Warning {
-    /// Time since the first measurement, s.
-    t_s: f64,
-    sentence: String,
-}
-
 /// The state of a run.
 #[derive(Debug)]
 pub(super) struct LiveRun {
@@ -62,7 +55,7 @@ pub(super) struct LiveRun {
     next_scan: u64,
     verdict: Option<LiveVerdict>,
     notes: Vec<String>,
-    warnings: Vec<Warning>,
+    warnings: Vec<Event>,
     /// Notes and warnings.
     events: Vec<String>,
     end: Option<LiveEnd>,
@@ -118,10 +111,8 @@ impl LiveRun {
                 }
             }
             Frame::Poses(poses) => poses.into_iter().for_each(|(stamp, pose)| self.take_pose(stamp, &pose)),
-            Frame::Verdict { verdict, events } => {
-                self.verdict = Some(verdict);
-                let warning = |(stamp, sentence)| Warning { t_s: self.seconds_after_start(stamp), sentence };
-                self.warnings = events.into_iter().map(warning).collect();
+            Frame::Verdict { verdict, warnings } => {
+                (self.verdict, self.warnings) = (Some(verdict), warnings);
                 self.list_events();
             }
         }
@@ -244,17 +235,16 @@ impl LiveRun {
         stamp.seconds_since(*self.origin.get_or_insert(stamp))
     }
 
-    /// As [`Self::seconds`], for events, which follow the first stamp.
-    fn seconds_after_start(&self, stamp: Stamp) -> f64 {
-        self.origin.map_or(0.0, |origin| stamp.seconds_since(origin))
-    }
-
     /// Lists notes and warnings. At the end of the estimate its warnings are notes too, which are not repeated.
     fn list_events(&mut self) {
-        let is_repeated = |note: &String| self.warnings.iter().any(|warning| note.contains(&warning.sentence));
+        let timed = |warning: &Event| {
+            let t_s = self.origin.map_or(0.0, |origin| warning.from.seconds_since(origin));
+            (t_s, warning.kind.to_string())
+        };
+        let warnings: Vec<(f64, String)> = self.warnings.iter().map(timed).collect();
+        let is_repeated = |note: &&String| warnings.iter().any(|(_, sentence)| note.contains(sentence));
         let notes = self.notes.iter().filter(|note| !is_repeated(note)).cloned();
-        let warnings = self.warnings.iter().map(|Warning { t_s, sentence }| format!("{t_s:.1} s: {sentence}"));
-        self.events = notes.chain(warnings).collect();
+        self.events = notes.chain(warnings.iter().map(|(t_s, sentence)| format!("{t_s:.1} s: {sentence}"))).collect();
     }
 }
 
@@ -283,6 +273,7 @@ mod tests {
     use super::*;
     use zsim_base::geometry::Rotation;
     use zsim_base::time::Span;
+    use zsim_estimation::EventKind;
 
     fn stamp(t_s: f64) -> Stamp {
         Stamp::from_nanos(1_000_000_000_000) + Span::from_seconds(t_s)
@@ -340,10 +331,11 @@ mod tests {
         let mut run = LiveRun::new(Volume::default());
         run.take(Frame::Poses(vec![(stamp(0.0), at_x(0.0))]));
         let verdict = LiveVerdict { status: "good".to_owned(), reason: String::new() };
-        run.take(Frame::Verdict { verdict, events: vec![(stamp(4.0), "weak geometry".to_owned())] });
-        run.take(Frame::Note("4.00 s: weak geometry (2 times, last at 5.00 s)".to_owned()));
+        run.take(Frame::Verdict { verdict, warnings: vec![Event::at(stamp(4.0), EventKind::ImuGap { seconds: 0.1 })] });
+        let sentence = "no IMU sample for 0.100 s; bridged by interpolation";
+        run.take(Frame::Note(format!("4.00 s: {sentence} (2 times, last at 5.00 s)")));
         run.take(Frame::Note("another note".to_owned()));
-        assert_eq!(run.events, ["another note", "4.0 s: weak geometry"]);
+        assert_eq!(run.events, ["another note", &format!("4.0 s: {sentence}")]);
     }
 
     #[test]

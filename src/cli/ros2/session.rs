@@ -21,7 +21,7 @@ use zsim_base::geometry::Vector;
 use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::time::Stamp;
 use zsim_estimation::{
-    EstimatedPose, EstimationError, Estimator, EstimatorSpec, Evidence, Status, Warning, WindowReport, findings,
+    EstimatedPose, EstimationError, Estimator, EstimatorSpec, Event, Evidence, Status, WindowReport, findings,
 };
 use zsim_recording::{Diagnostic, DiagnosticLevel, Incoming, ReceivedWriter, TumWriter};
 use zsim_run::{Cadence, MapOptions};
@@ -142,7 +142,7 @@ impl Inputs {
     }
 
     /// The evidence on the poses so far, as if the measurements ended at the last final pose.
-    fn evidence_so_far<'a>(&self, windows: &'a [WindowReport], warnings: &'a [Warning]) -> Option<Evidence<'a>> {
+    fn evidence_so_far<'a>(&self, windows: &'a [WindowReport], warnings: &'a [Event]) -> Option<Evidence<'a>> {
         let estimated = self.estimated?;
         Some(Evidence { windows, warnings, samples: self.imu.count(), recorded: estimated, estimated })
     }
@@ -303,13 +303,12 @@ impl Session {
             return Ok(());
         };
         let found = findings(&evidence);
-        let status = found.iter().map(|finding| finding.status).max().unwrap_or_default();
         let verdict = live::verdict(&found, evidence.estimated.0);
         let seconds = evidence.estimated.1.seconds_since(evidence.estimated.0);
         bar.set_task(format!("{seconds:.0} s, {:.1} m, {}: {}", self.inputs.length_m, verdict.status, verdict.reason));
         let value = |name: &str, value: String| (name.to_owned(), value);
         let diagnostic = Diagnostic {
-            level: match status {
+            level: match Status::of(&found) {
                 Status::Good => DiagnosticLevel::Ok,
                 Status::Degraded => DiagnosticLevel::Warn,
                 Status::Lost => DiagnosticLevel::Error,
@@ -374,7 +373,7 @@ impl Session {
             "restarts": self.restarts,
         });
         output::print_result(global, &text, json, folder)?;
-        let is_good = found.iter().all(|finding| finding.status == Status::Good) && losses.is_empty();
+        let is_good = Status::of(&found) == Status::Good && losses.is_empty();
         Ok(if is_good { Completion::Done } else { Completion::WithLoss })
     }
 }

@@ -37,9 +37,9 @@ use zsim_base::time::Stamp;
 /// Minimum overlap in time of fixes and IMU samples, s: needed to find the sample rate and the clock offset.
 const MIN_OVERLAP_S: f64 = 5.0;
 
-/// Smooths the trajectory of the base from IMU `samples` and pose `fixes`, both in time order.
+/// Smooths the trajectory of the base from IMU samples and pose fixes.
 ///
-/// Uses the inertial and clock settings of `spec`.
+/// `samples` and `fixes` are in order of time. Uses the inertial and clock settings of `spec`.
 ///
 /// # Errors
 /// When samples or fixes are not finite or not in order, overlap too little in time, or the gyroscope does not match the

@@ -77,14 +77,15 @@ struct Block<T> {
 }
 
 impl<T: Send + Sync> CloudFilter<T> {
-    /// Filter for a lidar of the given noise.
+    /// Creates a filter for a lidar of the given noise.
     pub fn new(noise: LidarNoise) -> Self {
         Self { noise, filling: None, complete: VecDeque::new(), classified: 0 }
     }
 
-    /// Adds the returns of a scan, in order of emission; returns the newly classified ones in input order.
+    /// Adds the returns of a scan; returns those that this classifies.
     ///
-    /// A block is classified about 6 s after its last return.
+    /// The returns of a scan are in order of emission, the classified ones in the order of the input. A block is
+    /// classified about 6 s after its last return.
     pub fn push(&mut self, scan: Vec<(ProjectedReturn, T)>) -> Vec<(T, ReturnClass)> {
         let Some((first, _)) = scan.first() else { return Vec::new() };
         let stamp = first.stamp;

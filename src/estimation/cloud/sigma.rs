@@ -2,7 +2,7 @@
 
 use zsim_base::geometry::{PoseCovariance, Vector, skew};
 
-/// Root mean square position error of a point in the map, m.
+/// Computes the root mean square position error of a point in the map, m.
 ///
 /// `range_sigma_m` is the standard deviation along the beam; `covariance` is that of the head's pose, position first; `arm`
 /// is the vector from the head to the point in map axes, m. The point `p = t + arm` moves by `dt + theta x arm`, so

@@ -1,13 +1,9 @@
 //! Reports on the windows, and the warnings derived from them.
 
-use crate::{Warning, WarningKind, WindowReport};
+use crate::integrity::MAX_CONTRADICTION;
+use crate::{Event, EventKind, WindowReport};
 use std::mem::discriminant;
 use zsim_base::time::Stamp;
-
-/// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise.
-///
-/// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
-const CONTRADICTION_THRESHOLD: f64 = 0.6;
 
 /// Tracking counts as lost after more dead reckoning than this, s, and than this fraction of the run.
 const TRACKING_LOST: (f64, f64) = (5.0, 0.2);
@@ -18,7 +14,7 @@ pub(super) struct Diagnostics {
     /// Duration of the segment that each window adds, s.
     step_s: f64,
     pub(super) windows: Vec<WindowReport>,
-    pub(super) warnings: Vec<Warning>,
+    pub(super) warnings: Vec<Event>,
     /// The problem of the newest window.
     problem: Option<Problem>,
 }
@@ -26,7 +22,7 @@ pub(super) struct Diagnostics {
 /// A problem of a window.
 #[derive(Debug)]
 struct Problem {
-    kind: WarningKind,
+    kind: EventKind,
     was_reported: bool,
 }
 
@@ -43,8 +39,8 @@ impl Diagnostics {
     }
 
     /// Adds a warning.
-    pub(super) fn warn(&mut self, stamp: Stamp, kind: WarningKind) {
-        self.warnings.push(Warning { stamp, kind });
+    pub(super) fn warn(&mut self, stamp: Stamp, kind: EventKind) {
+        self.warnings.push(Event::at(stamp, kind));
     }
 
     /// Adds the report on a window, and warns of its problem.
@@ -68,31 +64,31 @@ impl Diagnostics {
         if let Some(first) =
             self.windows.first().filter(|_| seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds)
         {
-            self.warnings.push(Warning { stamp: first.stamp, kind: WarningKind::Lost { seconds, of_seconds } });
+            self.warnings.push(Event::at(first.stamp, EventKind::Lost { seconds, of_seconds }));
         }
     }
 
     /// Warns if IMU and lidar contradict each other by more than noise explains.
     fn warn_of_contradiction(&mut self) {
         let all = self.windows.iter().map(|window| window.imu_contradiction);
-        let mut times: Vec<f64> = all.filter(|times| *times > CONTRADICTION_THRESHOLD).collect();
+        let mut times: Vec<f64> = all.filter(|times| *times > MAX_CONTRADICTION).collect();
         let [seconds, of_seconds] = [times.len(), self.windows.len()].map(|count| count as f64 * self.step_s);
         if seconds > TRACKING_LOST.0 && seconds > TRACKING_LOST.1 * of_seconds {
             times.sort_unstable_by(f64::total_cmp);
-            let kind = WarningKind::Contradicted { times: times[times.len() / 2], seconds, of_seconds };
-            self.warnings.extend(self.windows.first().map(|first| Warning { stamp: first.stamp, kind }));
+            let kind = EventKind::Contradicted { times: times[times.len() / 2], seconds, of_seconds };
+            self.warnings.extend(self.windows.first().map(|first| Event::at(first.stamp, kind)));
         }
     }
 
     /// Warns of a problem of two consecutive windows, or immediately of a rejected solution.
     ///
     /// The warning is repeated only after a window without a problem or with another one.
-    fn warn_of_problem(&mut self, problem: Option<WarningKind>, stamp: Stamp) {
+    fn warn_of_problem(&mut self, problem: Option<EventKind>, stamp: Stamp) {
         let previous = self.problem.take();
         let Some(kind) = problem else { return };
         let before = previous.filter(|before| discriminant(&before.kind) == discriminant(&kind));
         let was_reported = before.as_ref().is_some_and(|before| before.was_reported);
-        let report = !was_reported && (before.is_some() || matches!(kind, WarningKind::NotSolved { .. }));
+        let report = !was_reported && (before.is_some() || matches!(kind, EventKind::NotSolved { .. }));
         if report {
             self.warn(stamp, kind.clone());
         }
@@ -105,13 +101,10 @@ impl Diagnostics {
 /// Against the information of ten thousand matches it is that of a tenth of a match, which may be false.
 const UNOBSERVED: f64 = 1e-5;
 
-/// Whether a problem means that the window is dead reckoning with the IMU.
-fn is_dead_reckoning(problem: &WarningKind) -> bool {
-    match problem {
-        WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. } => true,
-        WarningKind::WeakGeometry { conditioning, .. } => *conditioning < UNOBSERVED,
-        _ => false,
-    }
+/// Whether a window with this problem is dead reckoning with the IMU, along one direction at least.
+fn is_dead_reckoning(problem: &EventKind) -> bool {
+    let is_unobserved = matches!(problem, EventKind::WeakGeometry { conditioning, .. } if *conditioning < UNOBSERVED);
+    problem.is_untracked() || is_unobserved
 }
 
 #[cfg(test)]
@@ -121,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_trace_of_information_about_a_direction_is_dead_reckoning() {
-        let along_a_corridor = |conditioning| WarningKind::WeakGeometry { conditioning, direction_in_map: Vector::x() };
+        let along_a_corridor = |conditioning| EventKind::WeakGeometry { conditioning, direction_in_map: Vector::x() };
         // Conditionings of windows in a corridor without any face along it, and of windows on stairs.
         for (conditioning, expected) in [(0.0, true), (3e-6, true), (2e-5, false), (4e-4, false)] {
             assert_eq!(is_dead_reckoning(&along_a_corridor(conditioning)), expected, "{conditioning}");

@@ -5,7 +5,7 @@ use super::phase::{GapRecovery, Tracking};
 use crate::consider::ConsiderCovariance;
 use crate::views::Views;
 use crate::window::Window;
-use crate::{EstimationError, WarningKind};
+use crate::{EstimationError, EventKind};
 
 impl Estimator {
     /// Localises a full window, if a search is pending; returns whether the window moved.
@@ -38,7 +38,7 @@ impl Estimator {
         if unplaced.is_some() {
             let (start_s, end_s) = (tracking.window.start_s(), tracking.window.nominal.end_s());
             let stamp = self.intake.stamp(start_s);
-            self.diagnostics.warn(stamp, WarningKind::TooShortToRelocalise { seconds: end_s - start_s });
+            self.diagnostics.warn(stamp, EventKind::TooShortToRelocalise { seconds: end_s - start_s });
         }
         Ok(unplaced)
     }
@@ -49,7 +49,7 @@ impl Estimator {
         let found = match map_localisation.find(window, &self.calibration.head_from_imu) {
             Some(Ok(found)) => found,
             Some(Err(_)) if map_localisation.found().is_some() => {
-                self.diagnostics.warn(self.intake.stamp(window.nominal.end_s()), WarningKind::LostInMap);
+                self.diagnostics.warn(self.intake.stamp(window.nominal.end_s()), EventKind::LostInMap);
                 return Ok(false);
             }
             Some(Err(error)) => return Err(error),
@@ -78,7 +78,7 @@ impl Estimator {
                 let local_map = search.into_local_map(window, &found);
                 let distance_m = (local_map.consider.pivot() - self.local_map.consider.pivot()).norm();
                 let ambiguity_m = found.ambiguity_m;
-                self.diagnostics.warn(stamp, WarningKind::Relocalised { distance_m, ambiguity_m });
+                self.diagnostics.warn(stamp, EventKind::Relocalised { distance_m, ambiguity_m });
                 window.move_by(&found.map_from_query);
                 self.local_map = local_map;
                 true
@@ -89,7 +89,7 @@ impl Estimator {
                 false
             }
             Err(why) => {
-                self.diagnostics.warn(stamp, WarningKind::NotRelocalised { why });
+                self.diagnostics.warn(stamp, EventKind::NotRelocalised { why });
                 false
             }
         }

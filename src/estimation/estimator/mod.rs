@@ -19,7 +19,7 @@ use crate::intake::{Intake, Segment};
 use crate::local_map::LocalMap;
 use crate::localisation::MapLocalisation;
 use crate::observed::ObservedSurfels;
-use crate::{EstimatedPose, EstimationError, EstimatorSpec, OpenLoop, Warning, WindowReport};
+use crate::{EstimatedPose, EstimationError, EstimatorSpec, Event, OpenLoop, WindowReport};
 use zsim_base::geometry::{Pose, Trajectory, Vector};
 use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::surfel_map::SurfelMap;
@@ -56,7 +56,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// An estimator without measurements.
+    /// Creates an estimator without measurements.
     ///
     /// # Errors
     /// If a setting or the calibration is invalid.
@@ -81,20 +81,24 @@ impl Estimator {
         })
     }
 
-    /// Also stores the observed surfaces for [`super::register`]; memory then grows with the recording.
+    /// Stores the observed surfaces too, for [`super::register`].
+    ///
+    /// Memory then grows with the recording.
     pub fn recording_surfels(self) -> Self {
         Self { observed: Some(ObservedSurfels::default()), ..self }
     }
 
-    /// Estimates the trajectory in the frame of `map`, with every window matched with the map.
+    /// Estimates the trajectory in the frame of `map`.
     ///
-    /// The head must start near `map_from_head`: within 1 m horizontally and 20 degrees of heading. The first pose is
-    /// available when the first full window is localised.
+    /// Every window is matched with the map. The head must start near `map_from_head`: within 1 m horizontally and 20
+    /// degrees of heading. The first pose is available when the first full window is localised.
     pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
         Self { map_localisation: Some(MapLocalisation::new(map, *map_from_head, &self.spec)), ..self }
     }
 
-    /// Adds a measurement, in approximate order of time; processes each segment that is complete.
+    /// Adds a measurement, and processes each segment that is complete.
+    ///
+    /// Measurements arrive in approximate order of time.
     ///
     /// # Errors
     /// If the measurement is not finite, or localisation in the given map fails.
@@ -106,22 +110,24 @@ impl Estimator {
         Ok(())
     }
 
-    /// The poses that became final since the last call, in order of time.
+    /// Returns the poses that became final since the last call, in order of time.
     pub fn take_poses(&mut self) -> Vec<EstimatedPose> {
         std::mem::take(&mut self.poses)
     }
 
-    /// The reports on all windows so far, in order of time.
+    /// Returns the reports on all windows so far, in order of time.
     pub fn windows(&self) -> &[WindowReport] {
         &self.diagnostics.windows
     }
 
-    /// The warnings so far, without those that concern the whole run.
-    pub fn warnings(&self) -> &[Warning] {
+    /// Returns the warnings so far, without those that concern the whole run.
+    pub fn warnings(&self) -> &[Event] {
         &self.diagnostics.warnings
     }
 
-    /// Processes the remaining data; the result has the poses not yet returned, and the reports of all windows.
+    /// Processes the remaining data, and returns the estimate.
+    ///
+    /// It has the poses not yet returned, and the reports of all windows.
     ///
     /// # Errors
     /// If IMU or lidar data are missing, empty or too short for a pose, localisation in the given map fails, or a pose is not finite.

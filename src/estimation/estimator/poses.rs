@@ -8,10 +8,11 @@ use zsim_base::geometry::{Pose, Rotation};
 use zsim_base::time::{Span, Stamp};
 
 impl Estimator {
-    /// The poses after `after` up to the end of the window, at whole multiples of the IMU period, as estimated so far.
+    /// Returns the poses so far after `after`, up to the end of the window.
     ///
-    /// Later windows change them; [`Self::take_poses`] returns them when they are final. None before the first window,
-    /// before the localisation in a given map, and while the place after a gap is not known.
+    /// They are at whole multiples of the IMU period. Later windows change them; [`Self::take_poses`] returns them when
+    /// they are final. None before the first window, before the localisation in a given map, and while the place after
+    /// a gap is not known.
     pub fn newest_poses(&self, after: Option<Stamp>) -> Vec<EstimatedPose> {
         let Phase::Tracking(tracking) = &self.phase else { return Vec::new() };
         let is_unplaced = self.map_localisation.as_ref().is_some_and(|map| map.found().is_none());

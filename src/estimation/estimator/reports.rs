@@ -3,7 +3,7 @@
 use super::Estimator;
 use crate::spec::SolveSpec;
 use crate::window::{Window, WindowSolution};
-use crate::{WarningKind, WindowReport};
+use crate::{EventKind, WindowReport};
 use zsim_base::time::Stamp;
 
 impl Estimator {
@@ -45,14 +45,14 @@ impl Estimator {
 }
 
 /// The problem of a window, if any; `expected`: whether surfaces should have been matched.
-fn problem(solved: &WindowSolution, spec: &SolveSpec, expected: bool) -> Option<WarningKind> {
+fn problem(solved: &WindowSolution, spec: &SolveSpec, expected: bool) -> Option<EventKind> {
     let matches = solved.matches + solved.view_matches;
     if let Some(reason) = solved.failure {
-        Some(WarningKind::NotSolved { reason })
+        Some(EventKind::NotSolved { reason })
     } else if expected && matches < spec.min_matches {
-        Some(WarningKind::FewMatches { matches })
+        Some(EventKind::FewMatches { matches })
     } else if expected && solved.conditioning < spec.weak_conditioning {
-        Some(WarningKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
+        Some(EventKind::WeakGeometry { conditioning: solved.conditioning, direction_in_map: solved.weakest })
     } else {
         None
     }

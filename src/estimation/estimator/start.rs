@@ -13,7 +13,7 @@ use crate::standstill::{Standstill, standstill};
 use crate::strapdown::Interval;
 use crate::surfel::SurfelBuilder;
 use crate::window::{Window, WindowSolution};
-use crate::{EstimatorSpec, WarningKind};
+use crate::{EstimatorSpec, EventKind};
 use zsim_base::geometry::Vector;
 use zsim_base::time::Stamp;
 
@@ -60,7 +60,7 @@ impl Estimator {
         let times = tracking.window.imu_contradiction();
         let is_rejected = correction_m > MAX_AT_START.0 || times > MAX_AT_START.1;
         if is_rejected {
-            self.diagnostics.warn(stamp, WarningKind::StartRejected { correction_m, times });
+            self.diagnostics.warn(stamp, EventKind::StartRejected { correction_m, times });
         }
         is_rejected
     }
@@ -124,7 +124,7 @@ impl Estimator {
             None => initial_state,
         };
         if before.is_none() && initial_state.rest.is_none() {
-            self.diagnostics.warn(self.intake.stamp(start_s), WarningKind::StartedInMotion);
+            self.diagnostics.warn(self.intake.stamp(start_s), EventKind::StartedInMotion);
         }
         let clock = match before {
             Some(before) => before.unknowns.clock.after_gap(before.until_s, start_s),
@@ -175,7 +175,7 @@ impl Estimator {
         }
         let NoiseFactors { gyro, accel } = factors;
         if gyro.max(accel) > REPORTED_NOISE_FACTOR {
-            self.diagnostics.warn(self.intake.stamp(start_s), WarningKind::NoisyImu { gyro, accel });
+            self.diagnostics.warn(self.intake.stamp(start_s), EventKind::NoisyImu { gyro, accel });
         }
     }
 

@@ -32,7 +32,7 @@ impl Clipped {
         self != Self::NONE
     }
 
-    /// The union of the axes of both.
+    /// Returns the union of the axes of both.
     pub fn or(self, other: Self) -> Self {
         let either = |a: [bool; 3], b: [bool; 3]| [0, 1, 2].map(|k| a[k] || b[k]);
         Self { gyro: either(self.gyro, other.gyro), accel: either(self.accel, other.accel) }

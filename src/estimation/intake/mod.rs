@@ -15,7 +15,7 @@ use super::spec::EstimatorSpec;
 use super::stamps::StampFilter;
 use super::strapdown::Interval;
 use super::surfel::TimedReturn;
-use super::{Discarded, EstimationError, Warning, WarningKind};
+use super::{EstimationError, Event, EventKind};
 use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::signal::Regularity;
 use zsim_base::time::{Span, Stamp};
@@ -77,7 +77,7 @@ pub(super) struct Intake {
     coasting: Coasting,
     /// Whether IMU gaps are bridged whatever the motion.
     gaps_are_bridged: bool,
-    warnings: Vec<Warning>,
+    warnings: Vec<Event>,
 }
 
 impl Intake {
@@ -120,7 +120,7 @@ impl Intake {
         self.samples.period_s()
     }
 
-    pub(super) fn take_warnings(&mut self) -> Vec<Warning> {
+    pub(super) fn take_warnings(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.warnings)
     }
 
@@ -232,8 +232,8 @@ impl Intake {
         self.report(&segment);
         self.next_start_s = end_s;
         if let Coverage::Gap(from_s, until_s) = coverage {
-            let kind = WarningKind::Restarted { seconds: until_s - from_s };
-            self.warnings.push(Warning { stamp: self.stamp(from_s), kind });
+            let seconds = until_s - from_s;
+            self.warnings.push(Event::lasting(self.stamp(from_s), seconds, EventKind::Restarted { seconds }));
             self.next_start_s = until_s + MARGIN_S;
             self.after_gap = true;
             self.samples.restart_at(until_s);
@@ -285,22 +285,21 @@ impl Intake {
     /// Adds the warnings of a segment: gaps and clipping.
     fn report(&mut self, segment: &Segment) {
         for (from_s, seconds) in self.samples.take_gaps() {
-            self.warnings.push(Warning { stamp: self.stamp(from_s), kind: WarningKind::ImuGap { seconds } });
+            self.warnings.push(Event::lasting(self.stamp(from_s), seconds, EventKind::ImuGap { seconds }));
         }
         if self.samples.clipped >= (CLIPPED_REPORT_FACTOR * self.clipped_reported).max(1) {
             self.report_clipping(segment.end_s);
         }
         let seconds = segment.end_s - self.scans.used_s();
         if segment.returns.is_empty() && seconds > LIDAR_GAP_S {
-            let stamp = self.stamp(segment.start_s);
-            self.warnings.push(Warning { stamp, kind: WarningKind::LidarGap { seconds } });
+            self.warnings.push(Event::at(self.stamp(segment.start_s), EventKind::LidarGap { seconds }));
         }
     }
 
     fn report_clipping(&mut self, at_s: f64) {
         let samples = self.samples.clipped;
         self.clipped_reported = samples;
-        self.warnings.push(Warning { stamp: self.stamp(at_s), kind: WarningKind::Saturated { samples } });
+        self.warnings.push(Event::at(self.stamp(at_s), EventKind::Saturated { samples }));
     }
 
     /// Adds the remaining warnings at the end of the data.
@@ -310,17 +309,15 @@ impl Intake {
         }
         let stamp = self.stamp(self.next_start_s);
         let discarded = self.samples.discarded;
-        for (what, count) in [
-            (Discarded::LateSamples, discarded.late),
-            (Discarded::LateScans, self.scans.late),
-            (Discarded::Outliers, discarded.outliers),
-            (Discarded::RepeatedSamples, discarded.frozen),
-            (Discarded::RepeatedScans, self.scans.frozen),
-        ] {
-            if count > 0 {
-                self.warnings.push(Warning { stamp, kind: WarningKind::Discarded { what, count } });
-            }
-        }
+        let kinds = [
+            EventKind::LateSamples { count: discarded.late },
+            EventKind::LateScans { count: self.scans.late },
+            EventKind::Outliers { count: discarded.outliers },
+            EventKind::RepeatedSamples { count: discarded.frozen },
+            EventKind::RepeatedScans { count: self.scans.frozen },
+        ];
+        let occurred = kinds.into_iter().filter(|kind| kind.magnitude() > Some(0.0));
+        self.warnings.extend(occurred.map(|kind| Event::at(stamp, kind)));
     }
 
     /// Length of time that the measurements of both sensors cover, s.

@@ -6,9 +6,9 @@ use zsim_base::signal::chi_squared_quantile;
 /// Probability that a position is within the bound.
 const PROBABILITY: f64 = 0.99;
 
-/// The radius that contains a Gaussian error with a probability of 99 %, in the unit of the standard deviations.
+/// Computes the radius that contains a Gaussian error with a probability of 99 %.
 ///
-/// Infinite if the matrix is not a valid covariance.
+/// In the unit of the standard deviations; infinite if the matrix is not a valid covariance.
 ///
 /// The squared error is a weighted sum of chi-squared variables, approximated by one scaled chi-squared variable of the
 /// same mean `tr P` and variance `2 tr P^2` (Satterthwaite, Biometrics Bulletin 2, 1946), which is exact for equal
@@ -25,7 +25,7 @@ pub fn radius_99(covariance: &Matrix) -> f64 {
     (0.5 * variance / mean * chi_squared_quantile(PROBABILITY, degrees)).sqrt()
 }
 
-/// The position and attitude blocks of a pose covariance, m^2 and rad^2.
+/// Returns the position and attitude blocks of a pose covariance, m^2 and rad^2.
 pub fn covariance_blocks(covariance: &PoseCovariance) -> (Matrix, Matrix) {
     (covariance.fixed_view::<3, 3>(0, 0).into_owned(), covariance.fixed_view::<3, 3>(3, 3).into_owned())
 }

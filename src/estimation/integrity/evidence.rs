@@ -1,17 +1,20 @@
 //! Tests of the estimator's assumptions, and the findings from them.
 
-use super::finding::{Cause, Finding, Status};
-use crate::{Discarded, Warning, WarningKind, WindowReport};
-use zsim_base::time::{Span, Stamp};
+use crate::{Event, EventKind, Severity, WindowReport, grouped};
+use zsim_base::time::Stamp;
 
 /// If more than this fraction of the samples is clipped, a loss of tracking is attributed to it.
 const LOST_CLIPPED_FRACTION: f64 = 0.02;
 
 /// Measures are evaluated over intervals of this length, s, or half of a shorter run.
 const INTERVAL_S: f64 = 5.0;
-/// Contradiction between IMU and lidar, as a multiple of the IMU noise, above which a result is degraded or lost. 0.12
-/// to 0.35 in 24 sound runs of all scenes, at most 0.61 in a window.
-const CONTRADICTION_LIMITS: Limits = Limits { degraded: 0.6, lost: 3.0 };
+/// Contradiction between IMU and lidar above which one of them is wrong, as a multiple of the IMU noise. 0.12 to 0.35 in
+/// 24 sound runs of all scenes, at most 0.61 in a window.
+///
+/// Noise causes less: the trajectory follows the IMU, and `noise_inflation` enlarges the assumed noise by half.
+pub(crate) const MAX_CONTRADICTION: f64 = 0.6;
+/// Contradiction above which a result is degraded or lost.
+const CONTRADICTION_LIMITS: Limits = Limits { degraded: MAX_CONTRADICTION, lost: 3.0 };
 /// Residual of matched surfaces above which a result is degraded or lost, m. 2 to 4.5 mm in sound runs, up to 6 mm in
 /// a window.
 const RESIDUAL_M: Limits = Limits { degraded: 0.010, lost: 0.018 };
@@ -54,13 +57,20 @@ struct Limits {
     lost: f64,
 }
 
+impl Limits {
+    /// Returns the severity of a value above the first limit.
+    fn severity(&self, value: f64) -> Severity {
+        if value > self.lost { Severity::Lost } else { Severity::Degraded }
+    }
+}
+
 /// The data used to assess an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence<'a> {
     /// The windows' reports, in order.
     pub windows: &'a [WindowReport],
     /// Warnings of the estimator.
-    pub warnings: &'a [Warning],
+    pub warnings: &'a [Event],
     /// Number of IMU samples.
     pub samples: usize,
     /// First and last stamp of the recording, lidar time.
@@ -69,67 +79,64 @@ pub struct Evidence<'a> {
     pub estimated: (Stamp, Stamp),
 }
 
-/// The findings of a run, one for each kind of cause, ordered by severity, then time.
-pub fn findings(evidence: &Evidence) -> Vec<Finding> {
+/// Determines the causes of the status of a run, one for each kind.
+///
+/// They are ordered by severity, then time.
+pub fn findings(evidence: &Evidence) -> Vec<Event> {
     let mut all = window_findings(evidence);
     all.extend(evidence.warnings.iter().filter_map(|warning| warning_finding(warning, evidence)));
     all.extend(calibration_findings(evidence.windows));
     all.extend(coverage_finding(evidence));
-    let mut merged: Vec<Finding> = Vec::new();
-    for finding in all {
-        let same = |other: &&mut Finding| other.status == finding.status && other.cause.kind() == finding.cause.kind();
-        match merged.iter_mut().find(same) {
-            Some(other) => {
-                (other.from, other.to) = (other.from.min(finding.from), other.to.max(finding.to));
-                if finding.cause.magnitude() > other.cause.magnitude() {
-                    other.cause = finding.cause;
-                }
-            }
-            None => merged.push(finding),
-        }
-    }
-    attribute_loss_to_clipping(&mut merged);
-    merged.sort_by_key(|finding| (std::cmp::Reverse(finding.status), !finding.is_sensor_fault(), finding.from));
-    merged
+    let merged = |group: Vec<&Event>| {
+        let span = |(from, to): (Stamp, Stamp), event: &&Event| (from.min(event.from), to.max(event.to));
+        let (from, to) = group.iter().fold((group[0].from, group[0].to), span);
+        Event { from, to, ..group[0].clone() }
+    };
+    let mut causes: Vec<Event> = grouped(&all).into_iter().map(merged).collect();
+    attribute_loss_to_clipping(&mut causes);
+    causes.sort_by_key(|cause| (std::cmp::Reverse(cause.severity), !cause.kind.is_sensor_fault(), cause.from));
+    causes
 }
 
 /// Marks clipping of many samples as a cause of loss if the result is lost.
-fn attribute_loss_to_clipping(findings: &mut [Finding]) {
-    let is_lost = findings.iter().any(|finding| finding.status == Status::Lost);
-    let is_severe = |cause: &Cause| matches!(cause, Cause::Clipped { fraction } if *fraction > LOST_CLIPPED_FRACTION);
-    findings
-        .iter_mut()
-        .filter(|finding| is_lost && is_severe(&finding.cause))
-        .for_each(|finding| finding.status = Status::Lost);
+fn attribute_loss_to_clipping(causes: &mut [Event]) {
+    let is_lost = causes.iter().any(|cause| cause.severity == Severity::Lost);
+    let is_severe =
+        |kind: &EventKind| matches!(kind, EventKind::Clipped { fraction } if *fraction > LOST_CLIPPED_FRACTION);
+    let severe = causes.iter_mut().filter(|cause| is_lost && is_severe(&cause.kind));
+    severe.for_each(|cause| cause.severity = Severity::Lost);
 }
 
-/// Evaluates a measure over intervals of windows: worst status, largest value, start and end, if above a threshold.
+/// Evaluates a measure over intervals of windows: the cause of the `kind`, if the measure is above its limits.
+///
+/// `kind` receives the largest value, and start and end of the event.
 fn over_intervals(
     windows: &[WindowReport],
     measure: impl Fn(&[WindowReport]) -> f64,
     limits: Limits,
-) -> Option<(Status, f64, Stamp, Stamp)> {
+    kind: impl Fn(f64, Stamp, Stamp) -> EventKind,
+) -> Option<Event> {
     let step_s = median(windows.windows(2).map(|pair| pair[1].stamp.seconds_since(pair[0].stamp)).collect());
     let length = ((INTERVAL_S / step_s.clamp(0.1, INTERVAL_S)).round() as usize).min(windows.len() / 2).max(1);
-    let mut found: Option<(Status, f64, Stamp, Stamp)> = None;
+    let mut found: Option<(Severity, f64, Stamp, Stamp)> = None;
     for interval in windows.windows(length) {
         let value = measure(interval);
         if value <= limits.degraded {
             continue;
         }
-        let status = if value > limits.lost { Status::Lost } else { Status::Degraded };
+        let severity = limits.severity(value);
         let (from, to) = (interval[0].stamp, interval[length - 1].stamp);
         found = Some(match found {
             // A loss lasts from the first lost interval.
-            Some((worst, magnitude, starts, ends)) if worst >= status => {
-                let ends = if worst > status { ends } else { to };
+            Some((worst, magnitude, starts, ends)) if worst >= severity => {
+                let ends = if worst > severity { ends } else { to };
                 (worst, magnitude.max(value), starts, ends)
             }
-            Some((_, magnitude, ..)) => (status, magnitude.max(value), from, to),
-            None => (status, value, from, to),
+            Some((_, magnitude, ..)) => (severity, magnitude.max(value), from, to),
+            None => (severity, value, from, to),
         });
     }
-    found
+    found.map(|(severity, value, from, to)| Event { from, to, severity, kind: kind(value, from, to) })
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
@@ -139,24 +146,18 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 
 /// Whether a window is dead reckoning with the IMU although surfaces should have been matched.
 fn is_untracked(window: &WindowReport) -> bool {
-    matches!(window.problem, Some(WarningKind::FewMatches { .. } | WarningKind::NotSolved { .. }))
+    window.problem.as_ref().is_some_and(EventKind::is_untracked)
 }
 
 /// Findings from the window reports.
-fn window_findings(evidence: &Evidence) -> Vec<Finding> {
+fn window_findings(evidence: &Evidence) -> Vec<Event> {
     let windows = evidence.windows;
-    let is_clipped = evidence.warnings.iter().any(|warning| matches!(warning.kind, WarningKind::Saturated { .. }));
+    let is_clipped = evidence.warnings.iter().any(|warning| matches!(warning.kind, EventKind::Saturated { .. }));
     let contradiction = |interval: &[WindowReport]| median(interval.iter().map(|w| w.imu_contradiction).collect());
     let residual = |interval: &[WindowReport]| median(interval.iter().map(|w| w.residual_rms_m).collect());
     let untracked =
         |interval: &[WindowReport]| interval.iter().filter(|w| is_untracked(w)).count() as f64 / interval.len() as f64;
     let fastest = |interval: &[WindowReport]| interval.iter().map(|w| w.speed_m_per_s).fold(0.0, f64::max);
-    let mut all = Vec::new();
-    let mut add = |found: Option<(Status, f64, Stamp, Stamp)>, cause: &dyn Fn(f64, Stamp, Stamp) -> Cause| {
-        all.extend(found.map(|(status, value, from, to)| Finding { status, cause: cause(value, from, to), from, to }));
-    };
-    add(over_intervals(windows, contradiction, CONTRADICTION_LIMITS), &|times, _, _| Cause::Contradiction { times });
-    add(over_intervals(windows, residual, RESIDUAL_M), &|residual_m, _, _| Cause::PoorFit { residual_m });
     let both = |interval: &[WindowReport]| {
         // Clipped samples explain an implausible scale.
         let scales = interval.iter().map(|w| w.imu_matrix.over_model() / IMU_SCALE.degraded);
@@ -164,28 +165,21 @@ fn window_findings(evidence: &Evidence) -> Vec<Finding> {
         let lidar = (residual(interval) / RESIDUAL_M.degraded).max(scale);
         lidar.min(contradiction(interval) / CONTRADICTION_LIMITS.degraded)
     };
-    add(over_intervals(windows, both, INCONSISTENT), &|ratio, _, _| Cause::Inconsistent { ratio });
-    add(over_intervals(windows, untracked, UNTRACKED_FRACTIONS), &|_, from, to| Cause::FewMatches {
-        seconds: untracked_s(windows, from, to),
-    });
-    add(over_intervals(windows, fastest, SPEED_M_PER_S), &|speed_m_per_s, _, _| Cause::Speed { speed_m_per_s });
+    let untracked_for = |_, from, to| EventKind::Untracked { seconds: untracked_s(windows, from, to) };
     // The head matches no surface for most of the run, and does not rest, or might move at constant velocity where the
     // lidar would not show it: the trajectory is unknown.
-    let (unobserved, assumed) =
-        (mostly_unmatched(windows, |w| !w.resting), mostly_unmatched(windows, |w| w.resting && !w.sees_rest));
-    all.extend(unobserved.map(|(seconds, from, to)| Finding {
-        status: Status::Lost,
-        cause: Cause::FewMatches { seconds },
-        from,
-        to,
-    }));
-    all.extend(assumed.map(|(seconds, from, to)| Finding {
-        status: Status::Lost,
-        cause: Cause::RestAssumed { seconds },
-        from,
-        to,
-    }));
-    all
+    let unobserved = mostly_unmatched(windows, |w| !w.resting);
+    let assumed = mostly_unmatched(windows, |w| w.resting && !w.sees_rest);
+    let causes = [
+        over_intervals(windows, contradiction, CONTRADICTION_LIMITS, |times, _, _| EventKind::Contradiction { times }),
+        over_intervals(windows, residual, RESIDUAL_M, |residual_m, _, _| EventKind::PoorFit { residual_m }),
+        over_intervals(windows, both, INCONSISTENT, |ratio, _, _| EventKind::Inconsistent { ratio }),
+        over_intervals(windows, untracked, UNTRACKED_FRACTIONS, untracked_for),
+        over_intervals(windows, fastest, SPEED_M_PER_S, |speed_m_per_s, _, _| EventKind::Speed { speed_m_per_s }),
+        unobserved.map(|(seconds, from, to)| Event::over(from, to, EventKind::Untracked { seconds })),
+        assumed.map(|(seconds, from, to)| Event::over(from, to, EventKind::RestAssumed { seconds })),
+    ];
+    causes.into_iter().flatten().collect()
 }
 
 /// Returns the duration of the untracked windows from `from` to `to`, s.
@@ -207,56 +201,45 @@ fn mostly_unmatched(
     (fraction > MAX_UNMATCHED_FRACTION).then_some((fraction * to.seconds_since(from), from, to))
 }
 
-/// The finding that follows from a warning, if any.
-fn warning_finding(warning: &Warning, evidence: &Evidence) -> Option<Finding> {
-    let end = evidence.recorded.1;
-    let from = warning.stamp;
-    let lasting = |seconds: f64| from + Span::from_seconds(seconds);
-    let (status, cause, to) = match &warning.kind {
-        WarningKind::Restarted { seconds } => {
-            (Status::Degraded, Cause::Gap { sensor: "IMU", seconds: *seconds }, lasting(*seconds))
+/// Determines the cause that follows from a warning, if any.
+fn warning_finding(warning: &Event, evidence: &Evidence) -> Option<Event> {
+    let (samples, end) = (evidence.samples, evidence.recorded.1);
+    let (kind, to) = match warning.kind {
+        EventKind::Restarted { seconds } => (EventKind::Gap { sensor: "IMU", seconds }, warning.to),
+        EventKind::ImuGap { seconds } if seconds > GAP_S => (EventKind::Gap { sensor: "IMU", seconds }, warning.to),
+        EventKind::LidarGap { seconds } if seconds > LIDAR_GAP_S => {
+            (EventKind::Gap { sensor: "lidar", seconds }, warning.to)
         }
-        WarningKind::ImuGap { seconds } if *seconds > GAP_S => {
-            (Status::Degraded, Cause::Gap { sensor: "IMU", seconds: *seconds }, lasting(*seconds))
+        EventKind::Lost { seconds, .. } => (EventKind::Untracked { seconds }, end),
+        EventKind::NotRelocalised { .. } | EventKind::LostInMap => (EventKind::UnknownOffset, end),
+        EventKind::Saturated { samples: clipped } if clipped as f64 > CLIPPED_FRACTION * samples as f64 => {
+            (EventKind::Clipped { fraction: clipped as f64 / samples.max(1) as f64 }, end)
         }
-        WarningKind::LidarGap { seconds } if *seconds > LIDAR_GAP_S => {
-            (Status::Degraded, Cause::Gap { sensor: "lidar", seconds: *seconds }, from)
-        }
-        WarningKind::Lost { seconds, .. } => (Status::Lost, Cause::FewMatches { seconds: *seconds }, end),
-        WarningKind::NotRelocalised { .. } | WarningKind::LostInMap => (Status::Lost, Cause::NotRelocalised, end),
-        WarningKind::Saturated { samples } if *samples as f64 > CLIPPED_FRACTION * evidence.samples as f64 => {
-            let fraction = *samples as f64 / evidence.samples.max(1) as f64;
-            (Status::Degraded, Cause::Clipped { fraction }, end)
-        }
-        WarningKind::Discarded { what: Discarded::RepeatedSamples, count } if *count > MAX_REPEATED.0 => {
-            (Status::Degraded, Cause::Frozen { sensor: "IMU", count: *count }, end)
-        }
-        WarningKind::Discarded { what: Discarded::RepeatedScans, count } if *count > MAX_REPEATED.1 => {
-            (Status::Degraded, Cause::Frozen { sensor: "lidar", count: *count }, end)
-        }
+        EventKind::RepeatedSamples { count } if count > MAX_REPEATED.0 => (EventKind::FrozenImu { count }, end),
+        EventKind::RepeatedScans { count } if count > MAX_REPEATED.1 => (EventKind::FrozenLidar { count }, end),
         _ => return None,
     };
-    Some(Finding { status, cause, from, to })
+    Some(Event::over(warning.from, to, kind))
 }
 
 /// Findings from implausible corrections of the calibration.
 ///
 /// They are evaluated in the second half of the run, where the estimates are best, and apply to the full run.
-fn calibration_findings(windows: &[WindowReport]) -> Vec<Finding> {
+fn calibration_findings(windows: &[WindowReport]) -> Vec<Event> {
     let (Some(first), Some(last)) = (windows.first(), windows.last()) else { return Vec::new() };
     let late = &windows[windows.len() / 2..];
-    let of = |value: f64, limits: Limits, cause: Cause| {
-        let status = if value > limits.lost { Status::Lost } else { Status::Degraded };
-        (value > limits.degraded).then_some(Finding { status, cause, from: first.stamp, to: last.stamp })
+    let of = |value: f64, limits: Limits, kind: EventKind| {
+        let (from, to, severity) = (first.stamp, last.stamp, limits.severity(value));
+        (value > limits.degraded).then_some(Event { from, to, severity, kind })
     };
     let correction_m = last.range_correction_m;
     let entries = late.iter().map(|window| window.imu_matrix);
     let entry = entries.max_by(|a, b| a.over_model().total_cmp(&b.over_model())).unwrap_or_default();
     let rate = median(late.iter().map(|window| window.clock_rate.abs()).collect());
     [
-        of(correction_m.abs(), RANGE_CORRECTION_M, Cause::RangeCorrection { correction_m }),
-        of(entry.over_model(), IMU_SCALE, Cause::ImuScale { entry }),
-        of(rate, CLOCK_RATE, Cause::ClockRate { rate }),
+        of(correction_m.abs(), RANGE_CORRECTION_M, EventKind::RangeCorrection { correction_m }),
+        of(entry.over_model(), IMU_SCALE, EventKind::ImuScale { value: entry.value, model_sigma: entry.model_sigma }),
+        of(rate, CLOCK_RATE, EventKind::ClockRate { rate }),
     ]
     .into_iter()
     .flatten()
@@ -264,27 +247,21 @@ fn calibration_findings(windows: &[WindowReport]) -> Vec<Finding> {
 }
 
 /// The finding that a part of the recording has no estimate.
-fn coverage_finding(evidence: &Evidence) -> Option<Finding> {
+fn coverage_finding(evidence: &Evidence) -> Option<Event> {
     let ((from, to), (starts, ends)) = (evidence.recorded, evidence.estimated);
     let (before_s, after_s) = (starts.seconds_since(from).max(0.0), to.seconds_since(ends).max(0.0));
     let seconds = before_s + after_s;
     let (from, to) = if before_s > after_s { (from, starts) } else { (ends, to) };
     let recorded_s = evidence.recorded.1.seconds_since(evidence.recorded.0);
-    let cause = Cause::NotCovered { seconds };
-    (seconds > MISSING_FRACTION * recorded_s && seconds > 0.5).then_some(Finding {
-        status: Status::Degraded,
-        cause,
-        from,
-        to,
-    })
+    let is_large = seconds > MISSING_FRACTION * recorded_s && seconds > 0.5;
+    is_large.then(|| Event::over(from, to, EventKind::NotCovered { seconds }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::factors::{FACTOR_PER_FRACTION, NOT_CONVERGED_FRACTION, bound_factors};
     use super::*;
-    use crate::MatrixEntry;
-    use crate::Timing;
+    use crate::{MatrixEntry, Timing};
 
     /// Windows of a sound run, two per second.
     fn sound(count: usize) -> Vec<WindowReport> {
@@ -314,7 +291,7 @@ mod tests {
         (0..count).map(report).collect()
     }
 
-    fn judged(windows: &[WindowReport], warnings: &[Warning]) -> Vec<Finding> {
+    fn judged(windows: &[WindowReport], warnings: &[Event]) -> Vec<Event> {
         let recorded = (windows[0].stamp, windows[windows.len() - 1].stamp);
         findings(&Evidence { windows, warnings, samples: 6000, recorded, estimated: recorded })
     }
@@ -331,7 +308,7 @@ mod tests {
             let mut windows = sound(count);
             windows.iter_mut().for_each(|window| window.residual_rms_m = 0.03);
             let found = judged(&windows, &[]);
-            assert_eq!((found[0].status, found[0].cause.kind()), (Status::Lost, "poor_fit"));
+            assert_eq!((found[0].severity, found[0].kind.key()), (Severity::Lost, "poor_fit"));
         }
     }
 
@@ -341,10 +318,10 @@ mod tests {
         let mut windows = sound(80);
         windows[40..60].iter_mut().for_each(|window| window.imu_contradiction = 1.2);
         windows[65..].iter_mut().for_each(|window| window.residual_rms_m = 0.012);
-        assert!(judged(&windows, &[]).iter().all(|finding| finding.status == Status::Degraded));
+        assert!(judged(&windows, &[]).iter().all(|finding| finding.severity == Severity::Degraded));
         let lost_from = |windows: &[WindowReport]| {
             let found = judged(windows, &[]);
-            assert_eq!((found[0].status, found[0].cause.kind()), (Status::Lost, "inconsistent"));
+            assert_eq!((found[0].severity, found[0].kind.key()), (Severity::Lost, "inconsistent"));
             found[0].from
         };
         let mut unfit = windows.clone();
@@ -360,7 +337,7 @@ mod tests {
         let mut windows = sound(80);
         windows[40..60].iter_mut().for_each(|window| window.imu_contradiction = 1.2);
         let found = judged(&windows, &[]);
-        assert_eq!((found[0].status, found[0].cause.kind()), (Status::Degraded, "contradiction"));
+        assert_eq!((found[0].severity, found[0].kind.key()), (Severity::Degraded, "contradiction"));
         assert!(found[0].from >= windows[30].stamp && found[0].to <= windows[70].stamp);
         let factors = bound_factors(&windows);
         assert_eq!(factors[30].1, 1.0);
@@ -387,11 +364,11 @@ mod tests {
     fn only_the_time_without_matches_counts_as_lost() {
         // Two losses of 5 s, 25 s apart.
         let mut windows = sound(80);
-        let lose = |window: &mut WindowReport| window.problem = Some(WarningKind::FewMatches { matches: 3 });
+        let lose = |window: &mut WindowReport| window.problem = Some(EventKind::FewMatches { matches: 3 });
         windows[10..20].iter_mut().for_each(lose);
         windows[60..70].iter_mut().for_each(lose);
         let found = judged(&windows, &[]);
-        let Cause::FewMatches { seconds } = found[0].cause else { panic!("{found:?}") };
+        let EventKind::Untracked { seconds } = found[0].kind else { panic!("{found:?}") };
         assert!((seconds - 10.0).abs() < 1.0, "{seconds}");
         assert!(found[0].to.seconds_since(found[0].from) > 25.0);
     }
@@ -400,22 +377,21 @@ mod tests {
     fn a_head_without_matches_is_lost_unless_the_lidar_shows_that_it_rests() {
         let mut windows = sound(20);
         windows.iter_mut().for_each(|window| (window.matches, window.view_matches, window.moving) = (0, 0, false));
-        assert_eq!(judged(&windows, &[])[0].status, Status::Lost);
+        assert_eq!(judged(&windows, &[])[0].severity, Severity::Lost);
         windows.iter_mut().for_each(|window| window.resting = true);
         assert_eq!(judged(&windows, &[]), vec![]);
         windows.iter_mut().for_each(|window| window.sees_rest = false);
         let found = judged(&windows, &[]);
-        assert_eq!((found[0].status, found[0].cause.kind()), (Status::Lost, "rest_assumed"));
+        assert_eq!((found[0].severity, found[0].kind.key()), (Severity::Lost, "rest_assumed"));
     }
 
     #[test]
     fn gaps_of_one_sensor_are_merged_into_one_finding_with_the_longest() {
         let windows = sound(80);
-        let gap =
-            |k: usize, seconds: f64| Warning { stamp: windows[k].stamp, kind: WarningKind::Restarted { seconds } };
+        let gap = |k: usize, seconds: f64| Event::lasting(windows[k].stamp, seconds, EventKind::Restarted { seconds });
         let found = judged(&windows, &[gap(10, 0.5), gap(30, 2.0), gap(50, 1.0)]);
         assert_eq!(found.len(), 1);
-        assert_eq!(found[0].cause, Cause::Gap { sensor: "IMU", seconds: 2.0 });
+        assert_eq!(found[0].kind, EventKind::Gap { sensor: "IMU", seconds: 2.0 });
         assert_eq!(found[0].from, windows[10].stamp);
     }
 
@@ -431,7 +407,7 @@ mod tests {
             estimated: (recorded.0, windows[40].stamp),
         };
         let found = findings(&evidence);
-        assert_eq!(found[0].cause, Cause::NotCovered { seconds: 19.5 });
+        assert_eq!(found[0].kind, EventKind::NotCovered { seconds: 19.5 });
         assert_eq!(found[0].from, windows[40].stamp);
     }
 }

@@ -1,7 +1,7 @@
 //! Factors on the error bound where the estimator's assumptions fail.
 
 use super::evidence::median;
-use crate::{WarningKind, WindowReport};
+use crate::{EventKind, WindowReport};
 use zsim_base::time::Stamp;
 
 /// Contradiction, residual (m), and IMU scale over its standard deviation, up to which the bound is not enlarged.
@@ -47,7 +47,7 @@ pub fn bound_factors(windows: &[WindowReport]) -> Vec<(Stamp, f64)> {
     let factor = |k: usize| {
         let contradiction = median(neighbourhood(k).iter().map(|w| w.imu_contradiction).collect());
         let residual_m = median(neighbourhood(k).iter().map(|w| w.residual_rms_m).collect());
-        let is_weak = |w: &WindowReport| matches!(w.problem, Some(WarningKind::WeakGeometry { .. }));
+        let is_weak = |w: &WindowReport| matches!(w.problem, Some(EventKind::WeakGeometry { .. }));
         let stays_weak = k + 1 >= WEAK_WINDOWS && windows[k + 1 - WEAK_WINDOWS..=k].iter().all(is_weak);
         let weak = if stays_weak { WEAK_FACTOR } else { 1.0 };
         let scale = (windows[k].imu_matrix.over_model() / NOMINAL_EVIDENCE.2).powi(2).min(MAX_SCALE_FACTOR);

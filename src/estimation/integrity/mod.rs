@@ -9,9 +9,8 @@
 mod bound;
 mod evidence;
 mod factors;
-mod finding;
 
 pub use bound::{covariance_blocks, radius_99};
+pub(crate) use evidence::MAX_CONTRADICTION;
 pub use evidence::{Evidence, findings};
 pub use factors::bound_factors;
-pub use finding::{Cause, Finding, Status};

@@ -48,9 +48,10 @@ pub fn map_of(
     map_from(spec.finest_voxel_m, spec.levels, surfels)
 }
 
-/// Registers the map `other` to `map`, starting at the pose `start` of its origin in `map`.
+/// Registers the map `other` to `map`, starting at the pose `start`.
 ///
-/// Both maps must be level. `start` must be within 1 m horizontally and 20 degrees of heading.
+/// Both maps must be level. `start` is the pose of the origin of `other` in `map`; it must be right to within 1 m
+/// horizontally and 20 degrees of heading.
 ///
 /// # Errors
 /// When no pose matches, or several poses match equally well.
@@ -66,9 +67,9 @@ pub fn locate_map(
     relocaliser.find(&query, &Vector::zeros(), start, &MAP_LIMITS).map_err(EstimationError::NotInMap)
 }
 
-/// Merges two maps in the frame of the first; `map_from_other` is the pose of the second in it.
+/// Merges two maps in the frame of the first.
 ///
-/// Surfels of the same surface are fused.
+/// `map_from_other` is the pose of the second in it. Surfels of the same surface are fused.
 ///
 /// # Errors
 /// When the maps have different resolutions.

@@ -24,7 +24,7 @@ pub(super) struct Inertial {
 }
 
 impl Inertial {
-    /// The residuals between the states at an interval's ends.
+    /// Computes the residuals between the states at an interval's ends.
     pub fn between(a: &State, b: &State, interval: &Interval, biases: &Biases, gravity: &Vector) -> Self {
         let turn = a.rotation.inverse() * b.rotation;
         let measured = Rotation::from_scaled_axis(interval.turn(biases));

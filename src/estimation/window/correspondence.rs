@@ -75,7 +75,7 @@ pub(super) struct Grouped<K> {
 }
 
 impl Match {
-    /// The other surfel if it is live: an index into the scene.
+    /// Returns the other surfel if it is live: an index into the scene.
     pub fn other(&self) -> Option<usize> {
         if let Counterpart::Live(b) = self.with { Some(b as usize) } else { None }
     }
@@ -99,7 +99,7 @@ impl<K> Default for Grouped<K> {
 }
 
 impl<K: Copy + Send + Sync> Grouped<K> {
-    /// The key and the indices of each run.
+    /// Iterates over the key and the indices of each run.
     pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = (K, impl Iterator<Item = usize>)> {
         (0..self.ends.len()).into_par_iter().map(|k| {
             let from = k.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -138,7 +138,7 @@ impl Matches {
         Self { spans, couplings, all, of_surfels, offsets }
     }
 
-    /// The matches of a surfel of the scene: indices into `all`.
+    /// Returns the matches of a surfel of the scene: indices into `all`.
     pub fn of_surfel(&self, surfel: usize) -> &[u32] {
         &self.of_surfels[self.offsets[surfel]..self.offsets[surfel + 1]]
     }
@@ -161,7 +161,9 @@ impl Neighbours {
 }
 
 impl CachedNeighbours {
-    /// Updates the neighbours of `patch` in the `chosen` views; views searched from about this position stay cached.
+    /// Updates the neighbours of `patch` in the `chosen` views.
+    ///
+    /// Views searched from about this position stay cached.
     pub fn update(&mut self, patch: &Patch, views: &Views, chosen: &[usize], matcher: &Matcher, count: usize) {
         let is_chosen = |number: u64| chosen.iter().any(|index| views.view(*index).number == number);
         let moved = (patch.centre - self.centre).norm() > SEARCH_MOTION_M;
@@ -176,7 +178,7 @@ impl CachedNeighbours {
         }
     }
 
-    /// The cached neighbours in the view with number `view`.
+    /// Returns the cached neighbours in the view with number `view`.
     pub fn found_in(&self, view: u64) -> &[u32] {
         self.found.iter().find(|(number, _)| *number == view).map_or(&[], |(_, patches)| patches)
     }

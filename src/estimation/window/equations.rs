@@ -37,14 +37,16 @@ pub(super) struct Robust {
 }
 
 impl Robust {
-    /// The kernel of an iteration: the threshold shrinks from `cauchy_start` to `cauchy_end`.
+    /// Creates the kernel of an iteration.
+    ///
+    /// The threshold shrinks from `cauchy_start` to `cauchy_end`.
     pub fn of(spec: &SolveSpec, iteration: usize) -> Self {
         let late = (iteration as f64 / (spec.max_iterations as f64 - 1.0).max(1.0)).min(1.0);
         let threshold = spec.cauchy_start + (spec.cauchy_end - spec.cauchy_start) * late;
         Self { weight: spec.match_weight, threshold }
     }
 
-    /// The weight of a match with residual `residual_m`.
+    /// Returns the weight of a match with residual `residual_m`.
     pub fn weight(&self, plane: &Plane, residual_m: f64) -> f64 {
         let normalised2 = residual_m * residual_m / plane.variance;
         self.weight / (plane.variance * (1.0 + normalised2 / (self.threshold * self.threshold)))
@@ -91,7 +93,9 @@ impl<const B: usize> SumsBySpan<B> {
 }
 
 impl WeightedMatches<'_> {
-    /// The sums of all matches; with `extrinsics`, including their derivatives by the lidar extrinsics.
+    /// Computes the sums of all matches.
+    ///
+    /// With `extrinsics`, they include the derivatives by the lidar extrinsics.
     pub fn sums(&self, extrinsics: bool) -> MatchSums {
         let weigh = |one: &Match| self.sign * self.robust.weight(&one.plane, one.plane.distance_m);
         let weights: Vec<f64> = self.matches.all.iter().map(weigh).collect();

@@ -65,7 +65,9 @@ impl FisherInformation {
         Self { model, start: None, before: None, epochs: Vec::new(), sightings }
     }
 
-    /// Adds the next true pose of the head, in lidar time, at 50 Hz or more; measurements of a time follow its poses.
+    /// Adds the next true pose of the head, in lidar time, at 50 Hz or more.
+    ///
+    /// Measurements of a time follow its poses.
     pub fn add_head(&mut self, stamp: Stamp, world_from_head: &Pose) {
         let world_from_imu = world_from_head * self.model.head_from_imu;
         let start = *self.start.get_or_insert(stamp);

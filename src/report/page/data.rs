@@ -2,7 +2,7 @@
 
 use crate::Metrics;
 use zsim_base::geometry::{Pose, Vector};
-use zsim_estimation::PartTime;
+use zsim_estimation::{PartTime, Severity};
 
 /// The data of the page of a run. Times are in s since the first measurement.
 pub struct RunPage<'a> {
@@ -239,22 +239,9 @@ pub struct TimelineRow {
     /// Kind of the events, in words.
     pub name: String,
     /// Severity of the events.
-    pub level: Level,
+    pub severity: Severity,
     /// The events.
     pub events: Vec<Interval>,
-}
-
-/// Severity of the events of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
-    /// The result is lost.
-    Lost,
-    /// The result is degraded.
-    Degraded,
-    /// Measurements are missing or unused, or the estimate has a gap.
-    Loss,
-    /// Information.
-    Note,
 }
 
 /// An event.

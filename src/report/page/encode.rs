@@ -2,8 +2,8 @@
 
 use super::binary::base64_f32;
 use super::data::{
-    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Level, Link, Ordinate, RunPage, Section, ShownMode,
-    SpringView, TimedPose, TimelineRow, View,
+    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Link, Ordinate, RunPage, Section, ShownMode, SpringView,
+    TimedPose, TimelineRow, View,
 };
 use super::quantise::cloud;
 use serde_json::{Value, json};
@@ -166,14 +166,8 @@ fn curve(curve: &Curve) -> Value {
 }
 
 fn timeline_row(row: &TimelineRow) -> Value {
-    let level = match row.level {
-        Level::Lost => "lost",
-        Level::Degraded => "degraded",
-        Level::Loss => "loss",
-        Level::Note => "note",
-    };
     let events = row.events.iter().map(|event| json!([event.from_s, event.to_s, event.sentence]));
-    json!({ "name": row.name, "level": level, "events": events.collect::<Vec<_>>() })
+    json!({ "name": row.name, "level": row.severity.name(), "events": events.collect::<Vec<_>>() })
 }
 
 #[cfg(test)]

@@ -29,8 +29,8 @@ mod update;
 use crate::rows;
 pub use benchmark::BenchmarkPage;
 pub use data::{
-    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Level, Link, Ordinate, RunPage, Section,
-    ShownMode, SpringView, TimedPose, TimelineRow, View, ViewPoint,
+    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Link, Ordinate, RunPage, Section, ShownMode,
+    SpringView, TimedPose, TimelineRow, View, ViewPoint,
 };
 pub use gains::{AxisGains, GainsPage};
 pub use html::{NamedValue, PagePlot};

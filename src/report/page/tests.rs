@@ -3,6 +3,7 @@
 use super::*;
 use crate::{CauseMetrics, IntegrityMetrics, Metrics};
 use zsim_base::geometry::{Pose, Vector};
+use zsim_estimation::Severity;
 
 const HOSTILE: &str = "</script><script>alert(1)</script>";
 /// Maximum size of a page, bytes.
@@ -23,7 +24,7 @@ fn metrics(status: &str) -> Metrics {
 
 fn page<'a>(metrics: &'a Metrics, view: View) -> RunPage<'a> {
     let interval = Interval { from_s: 1.0, to_s: 2.0, sentence: HOSTILE.to_owned() };
-    let row = TimelineRow { name: HOSTILE.to_owned(), level: Level::Lost, events: vec![interval] };
+    let row = TimelineRow { name: HOSTILE.to_owned(), severity: Severity::Lost, events: vec![interval] };
     RunPage { metrics, manifest: HOSTILE, parts: vec![], view, charts: vec![], timeline: vec![row] }
 }
 

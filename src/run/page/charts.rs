@@ -2,7 +2,7 @@
 
 use super::RunResults;
 use super::paths::TurnRates;
-use crate::integrity::Integrity;
+use crate::integrity::{Integrity, alignment_s};
 use zsim_base::geometry::Vector;
 use zsim_base::time::Stamp;
 use zsim_estimation::WindowReport;
@@ -65,7 +65,7 @@ fn error_and_bound(results: &RunResults) -> Chart {
 fn bound_title(results: &RunResults) -> String {
     let title = match results.pairs {
         Some(pairs) => {
-            let aligned_s = Integrity::aligned_seconds(pairs);
+            let aligned_s = alignment_s(pairs.duration_s());
             format!("Position error after alignment over the first {aligned_s:.0} s, and its 99 % bound")
         }
         None => "99 % bound on the position error".to_owned(),

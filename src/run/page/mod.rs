@@ -23,7 +23,7 @@ impl RunResults<'_> {
             parts: self.open.timing.parts().to_vec(),
             view: self.view(),
             charts: charts::all(self),
-            timeline: timeline::rows(self.open, &metrics.integrity.causes),
+            timeline: timeline::rows(self.open, self.integrity.causes()),
         }
     }
 

@@ -1,49 +1,27 @@
 //! The timeline of events.
 
-use crate::events::is_loss;
 use crate::open_loop::OpenLoopRun;
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use zsim_base::time::Stamp;
-use zsim_estimation::{Warning, WarningKind};
-use zsim_report::CauseMetrics;
-use zsim_report::page::{Interval, Level, TimelineRow};
+use zsim_estimation::Event;
+use zsim_report::page::{Interval, TimelineRow};
 
 /// Windows with the same problem within this time are one event, s.
 const MERGED_WITHIN_S: f64 = 0.5;
 
-/// Causes of the status, warnings of the estimator and windows with a problem, one row for each kind; most severe first.
-pub(super) fn rows(run: &OpenLoopRun, causes: &[CauseMetrics]) -> Vec<TimelineRow> {
-    let start = run.recorded.0;
-    let mut rows: BTreeMap<(Level, String), Vec<Interval>> = BTreeMap::new();
-    for cause in causes {
-        let level = if cause.status == "lost" { Level::Lost } else { Level::Degraded };
-        let interval = Interval { from_s: cause.from_s, to_s: cause.to_s, sentence: cause.sentence.clone() };
-        rows.entry((level, in_words(&cause.kind))).or_default().push(interval);
+/// Lists the events of a run, one row for each kind, most severe first.
+///
+/// They are the causes of the status, the warnings of the estimator, and the problems of the windows.
+pub(super) fn rows(run: &OpenLoopRun, causes: &[Event]) -> Vec<TimelineRow> {
+    let problems = run.windows.iter().filter_map(|window| Some(Event::at(window.stamp, window.problem.clone()?)));
+    let mut rows: BTreeMap<_, Vec<Interval>> = BTreeMap::new();
+    for event in causes.iter().chain(&run.warnings).cloned().chain(problems) {
+        let [from_s, to_s] = [event.from, event.to].map(|stamp| stamp.seconds_since(run.recorded.0));
+        let row = rows.entry((Reverse(event.severity), in_words(event.kind.key()))).or_default();
+        row.push(Interval { from_s, to_s, sentence: event.kind.to_string() });
     }
-    for Warning { stamp, kind } in &run.warnings {
-        add(&mut rows, kind, interval(*stamp, kind, start));
-    }
-    for window in &run.windows {
-        let Some(kind) = &window.problem else { continue };
-        add(&mut rows, kind, interval(window.stamp, kind, start));
-    }
-    let row = |((level, name), events)| TimelineRow { name, level, events: merged(events) };
+    let row = |((Reverse(severity), name), events)| TimelineRow { name, severity, events: merged(events) };
     rows.into_iter().map(row).collect()
-}
-
-fn add(rows: &mut BTreeMap<(Level, String), Vec<Interval>>, kind: &WarningKind, interval: Interval) {
-    let level = if is_loss(kind) { Level::Loss } else { Level::Note };
-    rows.entry((level, in_words(kind.name()))).or_default().push(interval);
-}
-
-/// The interval of a warning: an IMU gap starts at its stamp; other events have no duration, and repeat while they last.
-fn interval(stamp: Stamp, kind: &WarningKind, start: Stamp) -> Interval {
-    let at_s = stamp.seconds_since(start);
-    let lasts_s = match kind {
-        WarningKind::ImuGap { seconds } | WarningKind::Restarted { seconds } => *seconds,
-        _ => 0.0,
-    };
-    Interval { from_s: at_s, to_s: at_s + lasts_s, sentence: kind.to_string() }
 }
 
 /// Merges events that follow each other.
