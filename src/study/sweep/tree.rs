@@ -1,7 +1,7 @@
 //! The inputs of a run as one tree of settings: an axis of a sweep is a path into it.
 
 use super::{BaseSpec, JourneySpec, ReferenceSpec, settings};
-use crate::{StudyError, spec_types};
+use crate::StudyError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -10,7 +10,7 @@ use zsim_base::spec::{self, Kind, Named, Source, SpecError, name_from, to_json};
 use zsim_dynamics::{HeadSpec, LinkageSpec};
 use zsim_head::gains::GainsSpec;
 use zsim_head::spring::Shake;
-use zsim_run::{ReferenceInputs, RunInputs};
+use zsim_run::{ReferenceInputs, RunInputs, load_input};
 use zsim_simulation::{Run, Scenario};
 
 impl JourneySpec {
@@ -207,7 +207,7 @@ fn read<T: DeserializeOwned>(inputs: Map<String, Value>) -> Result<T, String> {
 /// If the spec is missing or invalid.
 pub(super) fn load_named(key: &str, name: &str) -> Result<Value, StudyError> {
     match Kind::of_input(key) {
-        Some(kind) => spec_types::load(kind, name),
+        Some(kind) => Ok(load_input(kind, name)?),
         None => Err(SpecError::plain(name, format!("`{key}` is not set by the name of a spec")).into()),
     }
 }
