@@ -132,10 +132,9 @@ fn text(bounded: &RecordingBound) -> String {
         rows.push(("unknown planes", map.planes.to_string()));
         rows.push(("beams on joint planes", format!("{:.1} %", 1e2 * map.joint_beam_fraction)));
     }
-    let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
     let divided = bound.unknown_map.as_ref().is_some_and(|map| map.joint_beam_fraction < 1.0);
     let caveat = if divided { CAVEAT } else { "" };
-    format!("No unbiased estimate can be better than:\n{}{caveat}", zsim_report::table(&[], &rows, false))
+    format!("No unbiased estimate can be better than:\n{}{caveat}", zsim_report::Table::facts(rows).text())
 }
 
 fn figures(bounded: &RecordingBound, scene: &str) -> Value {

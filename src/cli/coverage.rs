@@ -2,14 +2,14 @@
 
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
-use super::{Completion, coverage_text, output, quantity};
+use super::{Completion, output, quantity};
 use clap::Args;
 use std::path::Path;
 use zsim_base::files::replace_text;
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, NamedSpec, find};
 use zsim_dynamics::{self, ContactWatch, HeadModel, HeadState};
-use zsim_head::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, over_time_csv};
+use zsim_head::coverage::{Coverage, CoveragePlan, coverage, coverage_figure, density_csv, document, over_time_csv};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 
 /// Compute the coverage of the sphere by a lidar on a moving head: fraction, density and time, and the required gyroscope
@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         arguments.out.out.as_ref().map(|wanted| write_results(&seen, wanted, arguments.out.force)).transpose()?;
     contact.contact().iter().for_each(|contact| bar.note(&contact.warning()));
     drop(bar);
-    output::print_result(global, &text(&seen), serde_json::to_value(&seen)?, folder.as_deref())?;
+    output::print_result(global, &document(&seen).text(), serde_json::to_value(&seen)?, folder.as_deref())?;
     Ok(Completion::Done)
 }
 
@@ -84,21 +84,4 @@ fn write_results(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<
     }
     coverage_figure(seen).save(&folder, "coverage")?;
     Ok(folder)
-}
-
-fn text(seen: &Coverage) -> String {
-    let gyro = &seen.gyro;
-    let mut rows = coverage_text::rows(seen);
-    rows.extend([
-        ("time to half of the observed part, s", format!("{:.2}", seen.half_covered_s)),
-        ("beams per sr and s, mean and 10th percentile", {
-            format!("{:.0}, {:.0}", seen.density_per_sr_s.mean, seen.density_per_sr_s.p10)
-        }),
-        ("elevation range of the forward beam (95 %), deg", format!("{:.1}", seen.field_of_view_deg)),
-        ("maximum tilt of the scan plane, deg", format!("{:.1}", seen.most_tilt_deg)),
-        ("maximum rate on an axis, deg/s", format!("{:.0} of {:.0}", gyro.most_deg_per_s, gyro.limit_deg_per_s)),
-        ("99th percentile of the rate, deg/s", format!("{:.0}", gyro.p99_deg_per_s)),
-    ]);
-    let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
-    zsim_report::table(&[], &rows, false)
 }

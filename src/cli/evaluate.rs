@@ -105,6 +105,5 @@ fn text(metrics: &Map<String, Value>) -> String {
         None if value.is_null() => "-".to_owned(),
         _ => value.to_string(),
     };
-    let rows: Vec<Vec<String>> = metrics.iter().map(|(key, metric)| vec![key.clone(), value(metric)]).collect();
-    zsim_report::table(&[], &rows, true)
+    zsim_report::Table::facts(metrics.iter().map(|(key, metric)| (key, value(metric)))).text()
 }

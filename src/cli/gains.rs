@@ -13,8 +13,8 @@ use zsim_base::files::subfolder;
 use zsim_base::random::Seed;
 use zsim_dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim_head::gains::{
-    AXES, GainCurve, GainPlan, GainWatch, SwingStudy, axis_name, coherence_figure, csv, gain_curves, gain_figure,
-    min_coherence, page, peak_table, swing_csv, swing_figure, swing_study, with_damping,
+    AXES, GainCurve, GainPlan, GainWatch, SwingStudy, axis_name, coherence_figure, csv, document, gain_curves,
+    gain_figure, min_coherence, swing_csv, swing_figure, swing_study, with_damping,
 };
 use zsim_motion::Axis;
 
@@ -95,9 +95,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         swing_figure(swings).save(&plots, "swing")?;
     }
     let swings = swings.unwrap_or_default();
-    replace_text(&folder.join("report.html"), &page(&name(arguments), &head, &curves, &swings)?)?;
+    let document = document(&name(arguments), &head, &curves, &swings)?;
+    replace_text(&folder.join("report.html"), &document.html())?;
     drop(bar);
-    output::print_result(global, &text(&curves, &swings), figures(&curves, &swings)?, Some(&folder))?;
+    output::print_result(global, &document.text(), figures(&curves, &swings)?, Some(&folder))?;
     Ok(Completion::Done)
 }
 
@@ -159,37 +160,6 @@ fn swings(head: &HeadModel, degrees: &[f64], plan: &GainPlan, bar: &WorkBar) -> 
         Ok(swing_study(head, *axis, degrees, &plan, GainWatch { on_progress: &on_progress, ..GainWatch::silent() })?)
     };
     axes.iter().enumerate().map(study).collect()
-}
-
-fn text(curves: &[GainCurve], swings: &[SwingStudy]) -> String {
-    let dash = || "-".to_owned();
-    let mut words = peak_table(curves).body();
-    for study in swings {
-        let row = |p: &zsim_head::gains::SwingPoint| {
-            let number = |x: Option<f64>, decimals: usize| x.map_or(dash(), |x| format!("{x:.decimals$}"));
-            vec![
-                format!("{}, {:.1} deg", zsim_report::quantity_name(axis_name(study.axis)), p.swing_rms_deg),
-                format!("{:.1}", p.swing_most_deg),
-                number(p.peak.map(|peak| peak.freq_hz), 3),
-                number(p.peak.map(|peak| peak.gain), 2),
-                number(p.coherence, 3),
-            ]
-        };
-        let header = ["swing RMS", "max deg", "peak Hz", "gain", "coherence"];
-        words += "\n";
-        words += &zsim_report::table(&header, &study.points.iter().map(row).collect::<Vec<_>>(), true);
-        words +=
-            &study.ended.as_ref().map(|why| zsim_report::wrapped(&format!("ended {why}"), "  ")).unwrap_or_default();
-    }
-    let contacts = curves.iter().map(|curve| (curve.axis, curve.coil_contact));
-    let in_swings = swings.iter().flat_map(|study| study.points.iter().map(|p| (study.axis, p.coil_contact)));
-    for (axis, contact) in contacts.chain(in_swings) {
-        if let Some(contact) = contact {
-            let warning = format!("{}: {}", zsim_report::quantity_name(axis_name(axis)), contact.warning());
-            words += &zsim_report::wrapped(&warning, "  ");
-        }
-    }
-    words
 }
 
 fn figures(curves: &[GainCurve], swings: &[SwingStudy]) -> anyhow::Result<Value> {

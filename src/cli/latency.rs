@@ -7,7 +7,7 @@ use clap::Args;
 use std::path::PathBuf;
 use zsim_base::random::Seed;
 use zsim_base::spec::{Kind, NamedSpec, find};
-use zsim_study::latency::text_table;
+use zsim_study::latency::document;
 use zsim_study::sweep::{BaseSpec, Plan, Shard, SweepSpec};
 
 /// The study with the latencies and noises.
@@ -55,6 +55,6 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let failed =
         || anyhow!("failed runs: {}; {} has their errors", merged.status.failed, folder.join("table.csv").display());
     let study = merged.latency.as_ref().ok_or_else(failed)?;
-    output::print_result(global, &text_table(study), serde_json::to_value(study)?, Some(&folder))?;
+    output::print_result(global, &document(study).text(), serde_json::to_value(study)?, Some(&folder))?;
     Ok(Completion::Done)
 }

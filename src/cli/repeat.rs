@@ -54,9 +54,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 
 fn text(measures: &[(Measure, Option<f64>)]) -> String {
     let row = |(measure, value): &(Measure, Option<f64>)| {
-        vec![zsim_report::quantity_name(measure.key()), value.map_or("-".to_owned(), |value| format!("{value:.6}"))]
+        (zsim_report::quantity_name(measure.key()), value.map_or("-".to_owned(), |value| format!("{value:.6}")))
     };
-    zsim_report::table(&[], &measures.iter().map(row).collect::<Vec<_>>(), true)
+    zsim_report::Table::facts(measures.iter().map(row)).text()
 }
 
 fn figures(measures: &[(Measure, Option<f64>)]) -> Map<String, Value> {

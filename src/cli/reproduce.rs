@@ -10,13 +10,13 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use zsim_base::files::replace_text;
 use zsim_base::files::subfolder;
-use zsim_study::reproduction::{Experiment, Extent, Finding, TABLE_HEADING, paper_page, paper_table};
+use zsim_study::reproduction::{Experiment, Extent, Finding, PAPER_TITLE, paper_document};
 use zsim_study::sweep::Runner;
 
 /// Repeat the paper's experiments: compare the published results with zsim's
 ///
-/// Each writes its figures to DIR/paper/NAME/; DIR/paper.md is the table of all finished ones, DIR/paper/report.html a page
-/// with their tables, verdicts and plots. An interrupted experiment continues from its last finished run.
+/// Each writes its figures to DIR/paper/NAME/; DIR/paper.md has the tables and verdicts of all finished ones,
+/// DIR/paper/report.html also their plots. An interrupted experiment continues from its last finished run.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  zsim reproduce\n  zsim reproduce fig3 --out results\n  zsim reproduce accuracy --seeds 1,2,3 --out fresh"
@@ -64,13 +64,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         table(arguments, extent, &folder, &found)?;
         end_polling();
     }
-    let rows: Vec<Vec<String>> = found
-        .iter()
-        .filter_map(|finding| finding.result.as_ref())
-        .flat_map(|result| &result.rows)
-        .map(|row| vec![format!("{} {}", row.figure, row.what), row.paper.clone(), row.ours.clone()])
-        .collect();
-    let words = zsim_report::table(&["figure", "the paper", "ours"], &rows, false);
+    let words = paper_document(&found, &folder, extent, "", None)?.text();
     let figures = found.iter().filter_map(|Finding { experiment, result }| {
         let result = result.as_ref()?;
         Some(json!({ "name": experiment.given, "rows": result.rows, "notes": result.notes }))
@@ -87,7 +81,7 @@ fn load(name: &str, seeds: &[u64]) -> anyhow::Result<Experiment> {
 
 /// Refuses to replace a table that `zsim reproduce` did not write.
 fn check_table(path: &Path, force: bool) -> anyhow::Result<()> {
-    let is_foreign = |text: Vec<u8>| !text.starts_with(TABLE_HEADING.as_bytes());
+    let is_foreign = |text: Vec<u8>| !text.starts_with(format!("# {PAPER_TITLE}").as_bytes());
     if !force && std::fs::read(path).is_ok_and(is_foreign) {
         let message = format!(
             "{} was not written by zsim reproduce: name another folder with --out, or replace it with --force",
@@ -120,6 +114,7 @@ fn table(arguments: &Arguments, extent: Extent, folder: &Path, found: &[Finding]
     }
     let path = folder.with_extension("md");
     std::fs::create_dir_all(&arguments.out).with_context(|| format!("cannot create {}", arguments.out.display()))?;
-    replace_text(&path, &paper_table(&findings, extent, &options, arguments.label.as_deref()))?;
-    Ok(replace_text(&folder.join("report.html"), &paper_page(&findings, folder, extent, &options)?)?)
+    let document = paper_document(&findings, folder, extent, &options, arguments.label.as_deref())?;
+    replace_text(&path, &document.markdown(&format!("{}/", extent.folder())))?;
+    Ok(replace_text(&folder.join("report.html"), &document.html())?)
 }

@@ -2,7 +2,7 @@
 
 use super::arguments::{Global, OutArguments};
 use super::bars::WorkBar;
-use super::{Completion, output, quantity, spring_text};
+use super::{Completion, output, quantity};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use zsim_base::files::{replace_bytes, replace_text};
@@ -10,9 +10,9 @@ use zsim_base::spec::{Kind, NamedSpec, Source, SpecError, find};
 use zsim_dynamics::{self, HeadModel, HeadSpec, LinkageSpec};
 use zsim_elasticity::SpringSpec;
 use zsim_head::coverage::{CoveragePlan, coverage_figure};
-use zsim_head::spring::{HeadExport, Shake, SpringReport, mode_figure, page, spring_report};
+use zsim_head::spring::{HeadExport, Shake, SpringReport, document, mode_figure, spring_report};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
-use zsim_study::design::{DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
+use zsim_study::design::{self, DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
 use zsim_study::sweep::SweepSpec;
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
@@ -128,15 +128,19 @@ fn print_report(file: &str, arguments: &Arguments, global: &Global) -> anyhow::R
     let plan =
         CoveragePlan { from_s: 10.0, rate_limit_deg_per_s: imu.spec().gyro.limit_deg_per_s, ..CoveragePlan::default() };
     let report = spring_report(&subject.spec, &subject.source, &shake, &lidar, &plan)?;
+    let head = report.stands.then(|| HeadModel::new(&subject.spec, &subject.source)).transpose()?;
+    let document = document(&subject.name, &subject.spec, head.as_ref(), &report)?;
     let folder = match &arguments.out.out {
         None => None,
         Some(wanted) => {
             let folder = output::folder(wanted, arguments.out.force)?;
-            write_files(&folder, &subject, &report)?;
+            write_plots(&folder, &subject.spec, head.as_ref(), &report)?;
+            replace_text(&folder.join("report.html"), &document.html())?;
+            replace_text(&folder.join("spring.json"), &(serde_json::to_string_pretty(&report)? + "\n"))?;
             Some(folder)
         }
     };
-    output::print_result(global, &spring_text::report(&report), serde_json::to_value(&report)?, folder.as_deref())?;
+    output::print_result(global, &document.text(), serde_json::to_value(&report)?, folder.as_deref())?;
     Ok(Completion::Done)
 }
 
@@ -148,18 +152,13 @@ struct Subject {
     source: Source,
 }
 
-/// Writes the page, the plots and the figures.
-fn write_files(folder: &Path, subject: &Subject, report: &SpringReport) -> anyhow::Result<()> {
-    let Subject { name, spec, source } = subject;
-    let head = report.stands.then(|| HeadModel::new(spec, source)).transpose()?;
-    if let Some(head) = &head {
+fn write_plots(folder: &Path, spec: &HeadSpec, head: Option<&HeadModel>, report: &SpringReport) -> anyhow::Result<()> {
+    if let Some(head) = head {
         mode_figure(spec, head).save(folder, "modes")?;
     }
     if let Some(seen) = report.shaken.as_ref().and_then(|shaken| shaken.coverage.as_ref()) {
         coverage_figure(seen).save(folder, "coverage")?;
     }
-    replace_text(&folder.join("report.html"), &page(name, spec, head.as_ref(), report)?)?;
-    replace_text(&folder.join("spring.json"), &(serde_json::to_string_pretty(report)? + "\n"))?;
     Ok(())
 }
 
@@ -187,25 +186,25 @@ fn head_of(file: &str, head: &str) -> anyhow::Result<Subject> {
     }
 }
 
-fn search(design: &Design, global: &Global) -> anyhow::Result<Completion> {
-    let source = find(Kind::Study, &design.file)?;
+fn search(wanted: &Design, global: &Global) -> anyhow::Result<Completion> {
+    let source = find(Kind::Study, &wanted.file)?;
     let spec = DesignSpec::parse(&source).map_err(|error| match SweepSpec::parse(&source) {
         Ok(_) => {
-            SpecError::plain(&source.name, format!("it is a sweep, not a spring search: zsim study {}", design.file))
+            SpecError::plain(&source.name, format!("it is a sweep, not a spring search: zsim study {}", wanted.file))
         }
         Err(_) => error,
     })?;
     let bar = WorkBar::new(global, "searching");
     let study = DesignSearch::new(&spec, &source)?.run(&|fraction| bar.set_fraction(fraction))?;
     drop(bar);
-    let stem = Path::new(&design.file).file_stem().unwrap_or_default().to_string_lossy();
+    let stem = Path::new(&wanted.file).file_stem().unwrap_or_default().to_string_lossy();
     let name = spec.name.as_deref().unwrap_or(&stem);
-    let wanted = design.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{name}")));
-    let folder = output::folder(&wanted, design.out.force)?;
+    let out = wanted.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{name}")));
+    let folder = output::folder(&out, wanted.out.force)?;
     replace_text(&folder.join("pareto.csv"), &csv(&study))?;
     replace_text(&folder.join("rejected.csv"), &rejected_csv(&study))?;
     replace_text(&folder.join("design.ron"), &source.text)?;
     pareto_figure(&study).save(&folder, "pareto")?;
-    output::print_result(global, &spring_text::design(&study), serde_json::to_value(&study)?, Some(&folder))?;
+    output::print_result(global, &design::document(&study).text(), serde_json::to_value(&study)?, Some(&folder))?;
     Ok(if study.candidates.is_empty() { Completion::WithLoss } else { Completion::Done })
 }

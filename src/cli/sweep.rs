@@ -2,7 +2,6 @@
 
 use super::arguments::{Global, spec_file};
 use super::bars::{WorkBar, end_polling, stop_flag};
-use super::sweep_text::{plan_text, status_text};
 use super::usage::Usage;
 use super::{Completion, output, repeat, submit};
 use anyhow::{Context, bail};
@@ -147,7 +146,8 @@ fn plan_in(arguments: &PlanArguments, global: &Global) -> anyhow::Result<Complet
     let folder = output::folder_to_resume(&folder)?;
     let sweep = plan.write(&folder, arguments.force)?;
     let figures = json!({ "points": plan.runs(), "tasks": sweep.jobs() });
-    output::print_result(global, &plan_text(&sweep), figures, Some(&folder))?;
+    let words = format!("{} runs in {} tasks", plan.runs(), sweep.jobs());
+    output::print_result(global, &words, figures, Some(&folder))?;
     Ok(Completion::Done)
 }
 
@@ -226,6 +226,31 @@ pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Re
         bail!("all {} runs failed: {first}", merged.status.points);
     }
     Ok(if merged.status.missing == 0 { Completion::Done } else { Completion::WithLoss })
+}
+
+/// Progress of a sweep.
+fn status_text(status: &SweepStatus) -> String {
+    let mut rows = vec![
+        ("runs", status.points.to_string()),
+        ("completed", status.done.to_string()),
+        ("failed", status.failed.to_string()),
+        ("missing", status.missing.to_string()),
+    ];
+    if status.damaged > 0 {
+        rows.push(("damaged", status.damaged.to_string()));
+    }
+    let remaining = status.thread_s_left.filter(|_| status.missing > 0);
+    rows.extend(remaining.map(|seconds| ("remaining time, one thread", duration(seconds))));
+    zsim_report::Table::facts(rows).text()
+}
+
+/// A duration in readable units.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
 }
 
 fn print_status(global: &Global, status: &SweepStatus, folder: &Path) -> anyhow::Result<Completion> {

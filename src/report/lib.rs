@@ -4,6 +4,7 @@
 
 mod brief;
 mod comparison;
+mod document;
 mod figures;
 mod integrity;
 mod metrics;
@@ -23,6 +24,7 @@ pub use brief::brief;
 pub use comparison::{
     compared_errors, compared_trajectories, comparison_details, comparison_table, trajectory_figures,
 };
+pub use document::{Content, Document, Plot};
 pub use figures::{
     LengthUnit, bound_over_time, clock_offset, errors_over_time, head_pitch, open_and_closed_loop_errors,
     trajectory_views,
@@ -36,5 +38,5 @@ pub use names::{axis_label, quantity_name};
 pub use profile::timing_table;
 pub use quantity::{digits, length};
 pub use sensors::{NoiseMetrics, SensorMetrics, noise_sources};
-pub use table::{markdown, summary, table};
+pub use table::{Table, summary, table};
 pub use wrap::wrapped;

@@ -4,19 +4,8 @@ use super::Metrics;
 use super::quantity::{count, digits, length, percent, time};
 use super::sensors::noise_sources;
 
-/// A metric: name and formatted value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct MetricRow {
-    pub(super) name: &'static str,
-    pub(super) value: String,
-}
-
-/// Rows under a common title.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Group {
-    pub(super) title: &'static str,
-    pub(super) rows: Vec<MetricRow>,
-}
+/// Rows of a name and a formatted value, under a common title.
+type Group = (&'static str, Vec<Vec<String>>);
 
 /// Title of a run: scene, duration and seed.
 pub(super) fn title(metrics: &Metrics) -> String {
@@ -37,19 +26,19 @@ pub(super) fn groups(metrics: &Metrics) -> Vec<Group> {
         cloud(metrics),
         memory(metrics),
     ];
-    all.into_iter().filter(|group| !group.rows.is_empty()).collect()
+    all.into_iter().filter(|(_, rows)| !rows.is_empty()).collect()
 }
 
 /// Collects the rows of the known metrics.
-struct RowBuilder(Vec<MetricRow>);
+struct RowBuilder(Vec<Vec<String>>);
 
 impl RowBuilder {
     fn add<T: Copy>(&mut self, name: &'static str, value: Option<T>, format: impl Fn(T) -> String) {
-        self.0.extend(value.map(|value| MetricRow { name, value: format(value) }));
+        self.0.extend(value.map(|value| vec![name.to_owned(), format(value)]));
     }
 
     fn titled(self, title: &'static str) -> Group {
-        Group { title, rows: self.0 }
+        (title, self.0)
     }
 }
 
@@ -121,7 +110,7 @@ fn sensors(metrics: &Metrics) -> Group {
     let averaging = m.imu_averaging.as_deref().zip(m.imu_averaging_source.as_deref());
     rows.add("IMU averaging", averaging, |(kind, source)| format!("{kind}, {source}"));
     for (name, sensor) in [("IMU noise", "imu."), ("range noise", "lidar.")] {
-        rows.0.extend(noise_sources(&m.noise, sensor).map(|value| MetricRow { name, value }));
+        rows.0.extend(noise_sources(&m.noise, sensor).map(|value| vec![name.to_owned(), value]));
     }
     rows.titled("sensors")
 }

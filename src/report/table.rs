@@ -1,8 +1,8 @@
-//! Tables for the terminal (at most 80 columns) and for Markdown.
+//! Tables for the terminal (at most 80 columns), Markdown and CSV.
 
 use super::wrap::{MAX_WIDTH, wrapped};
 use super::{Metrics, rows, verdict};
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle, Width};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, TableStyle, Width};
 
 /// Row names that are narrower are not worth whole numbers.
 const MIN_NAME_WIDTH: usize = 12;
@@ -12,12 +12,94 @@ const MIN_NAME_WIDTH: usize = 12;
 /// The time of the layout grows with the square of the length.
 const MAX_CELL: usize = 200;
 
+/// A table of text; the first cell of a row names it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Table {
+    /// Names of the columns; empty if each row is a name and its value.
+    pub header: Vec<String>,
+    /// Rows, each with as many cells as the header.
+    pub rows: Vec<Vec<String>>,
+    /// For each row, the address that its name links to on a page; empty if no row has one.
+    pub links: Vec<Option<String>>,
+    /// Columns that the terminal has no room for.
+    pub details: Vec<usize>,
+    /// Number of columns after the first that the terminal shows at once; 0 for all.
+    pub columns_at_once: usize,
+}
+
+impl Table {
+    /// A table with these names of columns and rows.
+    pub fn new<N: Into<String>>(
+        header: impl IntoIterator<Item = N>,
+        rows: impl IntoIterator<Item = Vec<String>>,
+    ) -> Self {
+        let header = header.into_iter().map(Into::into).collect();
+        Self { header, rows: rows.into_iter().collect(), ..Self::default() }
+    }
+
+    /// A table of names and values, without a header.
+    pub fn facts<N: Into<String>>(rows: impl IntoIterator<Item = (N, String)>) -> Self {
+        Self::new([""; 0], rows.into_iter().map(|(name, value)| vec![name.into(), value]))
+    }
+
+    /// The table for the terminal, without details.
+    pub fn text(&self) -> String {
+        if self.header.is_empty() {
+            let is_number = |cell: &String| cell == "-" || cell.parse::<f64>().is_ok();
+            return table(&[], &self.rows, self.rows.iter().filter_map(|row| row.get(1)).all(is_number));
+        }
+        let shown: Vec<usize> = (1..self.header.len()).filter(|k| !self.details.contains(k)).collect();
+        let at_once = if self.columns_at_once == 0 { shown.len().max(1) } else { self.columns_at_once };
+        let part = |columns: &[usize]| {
+            let columns: Vec<usize> = [&[0], columns].concat();
+            let header: Vec<&str> = columns.iter().map(|k| self.header[*k].as_str()).collect();
+            let cells = |row: &Vec<String>| columns.iter().map(|k| row[*k].clone()).collect();
+            let has_numbers = columns[1..].iter().any(|k| self.has_numbers(*k));
+            table(&header, &self.rows.iter().map(cells).collect::<Vec<_>>(), has_numbers)
+        };
+        shown.chunks(at_once).map(part).collect::<Vec<_>>().join("\n")
+    }
+
+    /// The table as Markdown; columns of numbers are right-aligned.
+    pub fn markdown(&self) -> String {
+        let line = |cells: &[String]| {
+            let cell = |cell: &String| format!(" {} |", cell.replace('|', "\\|").replace('\n', " "));
+            format!("|{}\n", cells.iter().map(cell).collect::<String>())
+        };
+        let header = if self.header.is_empty() { &vec![String::new(); 2] } else { &self.header };
+        let rule = |k: usize| if self.has_numbers(k) { " ---: |" } else { " --- |" };
+        let rule: String = (0..header.len()).map(rule).collect();
+        format!("{}|{rule}\n{}", line(header), self.rows.iter().map(|row| line(row)).collect::<String>())
+    }
+
+    /// The table as CSV (RFC 4180).
+    pub fn csv(&self) -> String {
+        let line = |cells: &Vec<String>| cells.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n";
+        [&self.header].into_iter().chain(&self.rows).map(line).collect()
+    }
+
+    /// Whether all cells of column `k`, after the first column, are numbers or missing.
+    pub(super) fn has_numbers(&self, k: usize) -> bool {
+        k > 0 && self.rows.iter().filter_map(|row| row.get(k)).all(|cell| is_number(cell))
+    }
+}
+
+/// Whether a cell starts with a number, or has the mark of a missing one.
+fn is_number(cell: &str) -> bool {
+    matches!(cell, "" | "-" | "lost") || cell.starts_with(|c: char| c.is_ascii_digit() || "+-\u{2212}".contains(c))
+}
+
+/// Quotes text for CSV where needed (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
 /// Formats a table for the terminal, without rules between rows.
 ///
 /// The first column is text; with `numbers`, the other columns are right-aligned. Cells of more than 200 characters are cut.
 pub fn table(header: &[&str], rows: &[Vec<String>], numbers: bool) -> String {
     let rows: &[Vec<String>] = &rows.iter().map(|row| row.iter().map(|cell| cut(cell)).collect()).collect::<Vec<_>>();
-    let mut table = Table::new();
+    let mut table = comfy_table::Table::new();
     let rule = LineStyle::none().left('\u{2500}').fill('\u{2500}').junction('\u{2500}').right('\u{2500}');
     table.load_style(TableStyle::new().header_separator(rule));
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(MAX_WIDTH);
@@ -52,7 +134,7 @@ fn cut(cell: &str) -> String {
 /// Keeps names, `numbers` and the words above them whole as far as the width permits.
 ///
 /// A broken number would be read as two.
-fn keep_whole(table: &mut Table, header: &[&str], rows: &[Vec<String>], numbers: bool, padding: u16) {
+fn keep_whole(table: &mut comfy_table::Table, header: &[&str], rows: &[Vec<String>], numbers: bool, padding: u16) {
     let limit = room(table.column_count());
     let names = table.column_max_content_widths().first().map_or(0, |width| usize::from(*width));
     let cells: Vec<usize> = (1..table.column_count()).map(|k| widest(rows, k) + usize::from(padding)).collect();
@@ -85,27 +167,12 @@ fn widest(rows: &[Vec<String>], k: usize) -> usize {
     rows.iter().filter_map(|row| row.get(k)).map(|cell| cell.chars().count()).max().unwrap_or(0)
 }
 
-/// Formats a table in Markdown; columns of numbers, except the first, are right-aligned.
-pub fn markdown(header: &[&str], rows: &[Vec<String>]) -> String {
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        cells.fold("|".to_owned(), |line, cell| line + " " + &cell.replace('|', "\\|").replace('\n', " ") + " |") + "\n"
-    };
-    let is_number =
-        |cell: &String| cell.is_empty() || cell.starts_with(|c: char| c.is_ascii_digit() || "+-\u{2212}".contains(c));
-    let is_right = |k: usize| k > 0 && rows.iter().filter_map(|row| row.get(k)).all(is_number);
-    let rule: String = (0..header.len()).map(|k| if is_right(k) { " ---: |" } else { " --- |" }).collect();
-    let body = rows.iter().map(|row| line(&mut row.iter().map(String::as_str)));
-    line(&mut header.iter().copied()) + "|" + &rule + "\n" + &body.collect::<String>()
-}
-
 /// The summary of a run for the terminal: title, verdict and metrics.
 pub fn summary(metrics: &Metrics) -> String {
     let mut cells = Vec::new();
-    for group in rows::groups(metrics) {
-        for (index, row) in group.rows.into_iter().enumerate() {
-            let title = if index == 0 { group.title } else { "" };
-            cells.push(vec![title.to_owned(), row.name.to_owned(), row.value]);
-        }
+    for (title, rows) in rows::groups(metrics) {
+        let titles = std::iter::once(title).chain(std::iter::repeat(""));
+        cells.extend(titles.zip(rows).map(|(title, row)| [vec![title.to_owned()], row].concat()));
     }
     let verdict = verdict::verdict(metrics).map_or_else(String::new, |verdict| format!("verdict: {verdict}\n"));
     let head = wrapped(&format!("{}\n{verdict}", rows::title(metrics)), "  ");

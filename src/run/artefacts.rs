@@ -75,8 +75,8 @@ fn outline<'a>(
 /// Writes the plots and the page, then `metrics.json`.
 pub(super) fn write(folder: &Path, plots: &[Plot], page: &RunPage) -> Result<(), RunError> {
     let pictures = subfolder(folder, "plots").map_err(FileError::at(folder))?;
-    plots.par_iter().try_for_each(|plot| plot.figure.save(&pictures, plot.name))?;
-    replace_text(&folder.join("report.html"), &page.html()?)?;
+    plots.par_iter().try_for_each(|plot| plot.figure.save(&pictures, plot.name).map(drop))?;
+    replace_text(&folder.join("report.html"), &page.html())?;
     write_metrics(folder, page.metrics)
 }
 

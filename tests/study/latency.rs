@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use zsim::run::timing::{ClockState, Disturbance};
 use zsim::spec::{Kind, NamedSpec, Source, find, parse};
 use zsim::study::StudyError;
-use zsim::study::latency::{LatencyResult, csv, curve_figure, map_figure, text_table};
+use zsim::study::latency::{LatencyResult, csv, curve_figure, document, map_figure};
 use zsim::study::reproduction::ExperimentSpec;
 use zsim::study::sweep::{AxisSpec, BaseSpec, JourneySpec, Plan, Runner, Shard, SweepSpec};
 
@@ -73,7 +73,7 @@ fn latency_blurs_the_cloud_clock_estimation_recovers_it_and_a_stop_changes_nothi
     }
 
     assert_eq!(csv(&study).lines().count(), 9);
-    assert!(text_table(&study).contains("noise 5 ms"));
+    assert!(document(&study).text().contains("noise 5 ms"));
     assert!(map_figure(&study, ClockState::Off).svg().unwrap().contains("ms latency"));
     assert!(curve_figure(&study).svg().unwrap().contains("clock state on"));
 }

@@ -1,6 +1,6 @@
 //! `zsim benchmark score`: the errors of systems on the recordings of a suite.
 
-use super::scores::{Score, System, failures, figures, page, runs_csv, systems_table};
+use super::scores::{Score, System, document, figures, runs_csv};
 use super::suite::Suite;
 use crate::arguments::Global;
 use crate::trajectory_file::{self, Truth, TruthTimes};
@@ -66,9 +66,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     replace_text(&folder.join("scores.csv"), &runs_csv(&suite, &systems))?;
     let figures = figures(&suite, &systems, arguments.min_coverage);
     replace_text(&folder.join("scores.json"), &(serde_json::to_string_pretty(&figures)? + "\n"))?;
-    replace_text(&folder.join("scores.html"), &page(&suite, &systems, arguments.min_coverage))?;
-    let text = systems_table(&systems) + &failures(&suite, &systems);
-    output::print_result(global, &text, figures, Some(&folder.join("scores.html")))?;
+    let document = document(&suite, &systems, arguments.min_coverage);
+    replace_text(&folder.join("scores.html"), &document.html())?;
+    output::print_result(global, &document.text(), figures, Some(&folder.join("scores.html")))?;
     for (name, folder) in &arguments.system {
         note_unused(name, folder, &suite)?;
     }

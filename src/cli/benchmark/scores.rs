@@ -1,9 +1,9 @@
 //! Tables of the scores of a benchmark.
 
-use super::suite::Suite;
+use super::suite::{Item, Suite};
 use serde_json::{Map, Value, json};
 use zsim_evaluation::TrajectoryErrors;
-use zsim_report::page::{BenchmarkPage, PageTable};
+use zsim_report::{Content, Document, Table};
 
 /// A system with a score for each recording of the suite.
 pub(super) struct System {
@@ -29,7 +29,7 @@ const FIGURES: [(&str, Figure); 4] = [
     ("drift/min", |errors| errors.drift.map(|drift| drift.position_m_per_min)),
 ];
 
-/// Maximum number of failures in the terminal.
+/// Maximum number of failures in the list.
 const MAX_FAILURES: usize = 12;
 
 impl Score {
@@ -68,33 +68,6 @@ fn length(length_m: Option<f64>) -> String {
     length_m.filter(|length_m| length_m.is_finite()).map_or_else(|| "-".to_owned(), zsim_report::length)
 }
 
-fn systems_header() -> Vec<&'static str> {
-    ["", "succeeded"].into_iter().chain(FIGURES.map(|(name, _)| name)).chain(["worst APE"]).collect()
-}
-
-/// The table of the systems for the terminal.
-pub(super) fn systems_table(systems: &[System]) -> String {
-    zsim_report::table(&systems_header(), &systems.iter().map(System::row).collect::<Vec<_>>(), true)
-}
-
-/// Why trajectories count as failed, for the terminal; empty if none does.
-pub(super) fn failures(suite: &Suite, systems: &[System]) -> String {
-    let of_system = |system: &System| {
-        let scores = suite.recordings.iter().zip(&system.scores);
-        let failed = scores.filter_map(|(item, score)| Some((item.name.clone(), score.failure.clone()?)));
-        failed.map(|(item, failure)| format!("  {}, {item}: {failure}\n", system.name)).collect::<Vec<_>>()
-    };
-    let lines: Vec<String> = systems.iter().flat_map(of_system).collect();
-    let shown = lines.iter().take(MAX_FAILURES).map(String::as_str).collect::<String>();
-    match lines.len() {
-        0 => String::new(),
-        count if count > MAX_FAILURES => {
-            format!("\nfailed:\n{shown}  and {} more, in scores.csv\n", count - MAX_FAILURES)
-        }
-        _ => format!("\nfailed:\n{shown}"),
-    }
-}
-
 /// The errors by key, and the failure.
 fn values(score: &Score) -> Map<String, Value> {
     let mut values = score.errors.as_ref().map(zsim_report::trajectory_figures).unwrap_or_default();
@@ -126,7 +99,7 @@ pub(super) fn figures(suite: &Suite, systems: &[System], min_coverage: f64) -> V
     })
 }
 
-/// One row per recording and system, for `scores.csv`.
+/// The content of `scores.csv`: one row per recording and system.
 pub(super) fn runs_csv(suite: &Suite, systems: &[System]) -> String {
     const KEYS: [&str; 7] = [
         "coverage",
@@ -137,52 +110,58 @@ pub(super) fn runs_csv(suite: &Suite, systems: &[System]) -> String {
         "relative_error_per_second_m",
         "drift_m_per_min",
     ];
-    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    let mut text = format!("recording,system,{},failure\n", KEYS.join(","));
-    for (index, item) in suite.recordings.iter().enumerate() {
-        for system in systems {
-            let score = &system.scores[index];
-            let values = values(score);
-            let cell = |key: &&str| values.get(*key).filter(|value| !value.is_null()).map(Value::to_string);
-            let cells: Vec<String> = KEYS.iter().map(|key| cell(key).unwrap_or_default()).collect();
-            let failure = score.failure.as_deref().map(quoted).unwrap_or_default();
-            text += &format!("{},{},{},{failure}\n", quoted(&item.name), quoted(&system.name), cells.join(","));
-        }
-    }
-    text
+    let rows = scores(suite, systems).map(|(item, system, score)| {
+        let values = values(score);
+        let cell =
+            |key: &str| values.get(key).filter(|value| !value.is_null()).map(Value::to_string).unwrap_or_default();
+        let failure = score.failure.clone().unwrap_or_default();
+        [item.name.clone(), system.name.clone()].into_iter().chain(KEYS.map(cell)).chain([failure]).collect()
+    });
+    Table::new(["recording", "system"].into_iter().chain(KEYS).chain(["failure"]), rows).csv()
 }
 
-/// The page.
-pub(super) fn page(suite: &Suite, systems: &[System], min_coverage: f64) -> String {
-    let owned = |header: Vec<&str>| header.into_iter().map(str::to_owned).collect::<Vec<_>>();
-    let run = |(index, system): (usize, &System)| {
-        let score = &system.scores[index];
+/// The scores, recording by recording.
+fn scores<'a>(suite: &'a Suite, systems: &'a [System]) -> impl Iterator<Item = (&'a Item, &'a System, &'a Score)> {
+    let of_recording = |(index, item)| systems.iter().map(move |system| (item, system, &system.scores[index]));
+    suite.recordings.iter().enumerate().flat_map(of_recording)
+}
+
+/// The result for the terminal and the page.
+pub(super) fn document(suite: &Suite, systems: &[System], min_coverage: f64) -> Document {
+    let summary = format!(
+        "{} on the {} recordings of the suite {}, simulated by zsim {}. Medians over all recordings; one without a trajectory, \
+         or of which less than {:.0} % is estimated, counts as failed, with an infinite error.",
+        systems.iter().map(|system| system.name.as_str()).collect::<Vec<_>>().join(", "),
+        suite.recordings.len(),
+        suite.suite,
+        suite.version,
+        100.0 * min_coverage,
+    );
+    let mut document = Document::new("Benchmark", summary);
+    document.footer = "APE: position error after a rigid alignment, as evo_ape -a. RPE: over 1 m of path. Drift: after an alignment over the \
+                       first 20 s."
+        .to_owned();
+    let names = FIGURES.map(|(name, _)| name);
+    let header = ["system", "succeeded"].into_iter().chain(names).chain(["worst APE"]);
+    document.heading("Systems");
+    document.add(Table::new(header, systems.iter().map(System::row)));
+    let failed = |(item, system, score): (&Item, &System, &Score)| {
+        Some(format!("{}, {}: {}", system.name, item.name, score.failure.as_ref()?))
+    };
+    let mut failures: Vec<String> = scores(suite, systems).filter_map(failed).collect();
+    if failures.len() > MAX_FAILURES {
+        let more = format!("and {} more, in scores.csv", failures.len() - MAX_FAILURES);
+        failures.truncate(MAX_FAILURES);
+        failures.push(more);
+    }
+    document.heading("Failed");
+    document.add(Content::List(failures));
+    let rows = scores(suite, systems).map(|(item, system, score)| {
         let cells = FIGURES.map(|(_, of)| length(score.errors.as_ref().and_then(of)));
         let failure = score.failure.clone().unwrap_or_default();
-        let named = [suite.recordings[index].name.clone(), system.name.clone()];
-        named.into_iter().chain(cells).chain([failure]).collect::<Vec<String>>()
-    };
-    let runs = (0..suite.recordings.len()).flat_map(|index| systems.iter().map(move |system| (index, system)));
-    let header = ["recording", "system"].into_iter().chain(FIGURES.map(|(name, _)| name)).chain(["failure"]).collect();
-    let mut systems_header = owned(systems_header());
-    "system".clone_into(&mut systems_header[0]);
-    BenchmarkPage {
-        summary: format!(
-            "{} on the {} recordings of the suite {}, simulated by zsim {}. Medians over all recordings; one without a trajectory, \
-             or of which less than {:.0} % is estimated, counts as failed, with an infinite error.",
-            systems.iter().map(|system| system.name.as_str()).collect::<Vec<_>>().join(", "),
-            suite.recordings.len(),
-            suite.suite,
-            suite.version,
-            100.0 * min_coverage,
-        ),
-        systems: PageTable {
-            title: "Systems".to_owned(),
-            header: systems_header,
-            rows: systems.iter().map(System::row).collect(),
-            ..PageTable::default()
-        },
-        runs: PageTable { title: "Recordings".to_owned(), header: owned(header), rows: runs.map(run).collect(), ..PageTable::default() },
-    }
-    .html()
+        [item.name.clone(), system.name.clone()].into_iter().chain(cells).chain([failure]).collect()
+    });
+    document.heading("Recordings");
+    document.add_detail(Table::new(["recording", "system"].into_iter().chain(names).chain(["failure"]), rows));
+    document
 }

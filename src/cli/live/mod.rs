@@ -51,7 +51,7 @@ impl LiveArguments {
     pub(super) fn start(&self, page: impl FnOnce() -> LivePage) -> anyhow::Result<Option<Live>> {
         let Some(port) = self.live else { return Ok(None) };
         let page = page();
-        let shared = Arc::new(Shared::new(page.html()?, LiveRun::new(page.volume)));
+        let shared = Arc::new(Shared::new(page.html(), LiveRun::new(page.volume)));
         let address = server::start(port, shared.clone())
             .with_context(|| format!("--live {port}: the port cannot be opened on 127.0.0.1"))?;
         message::line(&format!("live: http://{address}/"));

@@ -3,15 +3,16 @@
 //! Directions are in the heading frame: vertical z axis, rotated with the base's yaw, so that turning the base does not
 //! increase the coverage.
 
+mod document;
 mod figure;
 mod result;
 mod sphere;
-mod table;
 mod track;
 
+pub(crate) use document::main_values;
+pub use document::{density_csv, document, over_time_csv};
 pub use figure::coverage_figure;
 pub use result::{Coverage, CoverageCell, CoveragePlan, Density, GyroUsage};
-pub use table::{density_csv, over_time_csv};
 
 use crate::HeadError;
 use sphere::Sphere;

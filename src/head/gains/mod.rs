@@ -10,20 +10,20 @@
 
 mod bode;
 mod curve;
+mod document;
 mod drive;
 mod figure;
 mod measure;
-mod page;
 mod swing;
 mod table;
 
 pub use bode::gain_figure;
 pub use curve::{AXES, GainCurve, GainPlan, GainPoint, axis_name};
+pub use document::document;
 pub use figure::{coherence_figure, coherence_panels, gain_panels, swing_figure};
 pub use measure::{GainWatch, gain_curve, gain_curves};
-pub use page::page;
 pub use swing::{SwingPoint, SwingStudy, swing_study};
-pub use table::{csv, min_coherence, peak_table, swing_csv};
+pub use table::{csv, min_coherence, swing_csv};
 
 use serde::{Deserialize, Serialize};
 use zsim_base::spec::checked;

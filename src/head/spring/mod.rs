@@ -1,6 +1,7 @@
 //! Design of the spring under a head: metrics of a given spring, and the search for one that meets goals.
 
 mod capacity;
+mod document;
 mod excited_mode;
 mod export;
 mod fatigue;
@@ -10,21 +11,19 @@ mod mode_figure;
 mod mode_name;
 mod model;
 mod outline;
-mod page;
 mod report;
 mod shake;
 mod tables;
 mod view_plane;
 mod wire;
 
+pub use document::document;
 pub use export::{ExportError, HeadExport};
 pub use fatigue::{MISSION_HOURS, StressCycle};
 pub use margins::SpringMargins;
 pub use metrics::{DesignMetrics, closed_form, simulated};
 pub use mode_figure::mode_figure;
 pub use mode_name::mode_name;
-pub use page::page;
 pub use report::{CoilReport, ModeReport, RestReport, ShakeResponse, SpringReport, spring_report};
 pub use shake::Shake;
-pub use tables::{Property, mode_table, properties, stiffness_table};
 pub use wire::{SpringMounting, Wire, WireLoad};

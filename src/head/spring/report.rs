@@ -339,8 +339,8 @@ mod tests {
         let buckling_at = |margin: f64| {
             let mut report = report.clone();
             report.coil.as_mut().unwrap().buckling_margin = Some(margin);
-            let mut rows = super::super::tables::properties(&report).into_iter();
-            rows.find(|row| row.name == "buckling load").unwrap().value
+            let rows = super::super::tables::properties(&report).rows;
+            rows.into_iter().find(|row| row[0] == "buckling load").unwrap().remove(1)
         };
         assert!(buckling_at(1.24).contains("valid up to 80 %") && !buckling_at(1.26).contains("valid"));
         let coil = report.coil.unwrap();

@@ -1,61 +1,73 @@
-//! Tables of the report on a spring, for terminal and page.
+//! Tables of the report on a spring.
 
 use super::mode_figure::ratio;
-use super::{CoilReport, ModeReport, RestReport, SpringReport};
+use super::{CoilReport, DesignMetrics, RestReport, ShakeResponse, SpringReport};
+use crate::coverage::main_values;
 use zsim_dynamics::{ElementKind, ElementLoad};
 use zsim_elasticity::VALID_BUCKLING_MARGIN;
-use zsim_report::page::PageTable;
+use zsim_report::Table;
 
 /// Names of the six directions of a stiffness matrix or a mode shape.
 const DIRECTIONS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// A value of a report with its name.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Property {
-    /// Name.
-    pub name: &'static str,
-    /// Value with its unit.
-    pub value: String,
-}
+/// A name and a value with its unit.
+type Property = (&'static str, String);
 
 /// Load, rest pose and limits.
-pub fn properties(report: &SpringReport) -> Vec<Property> {
-    let mut rows = vec![row("head", format!("{:.3} kg", report.head_mass_kg))];
+pub(super) fn properties(report: &SpringReport) -> Table {
+    let mut rows = vec![("head", format!("{:.3} kg", report.head_mass_kg))];
     let heaviest = match (report.heaviest_head_kg, &report.heaviest_head_limit) {
         (Some(kg), Some(limit)) => format!("{kg:.3} kg (above: {limit})"),
         _ => "no limit by the rest pose; strength unknown".to_owned(),
     };
-    rows.push(row("stable rest pose", if report.stands { "yes" } else { "no" }.to_owned()));
-    rows.push(row("maximum mass of this head", heaviest));
+    rows.push(("stable rest pose", if report.stands { "yes" } else { "no" }.to_owned()));
+    rows.push(("maximum mass of this head", heaviest));
     rows.extend(report.rest.iter().flat_map(rest));
     rows.extend(report.bearings.iter().map(bearing));
     rows.extend(report.coil.iter().flat_map(coil));
-    rows
+    Table::facts(rows)
 }
 
-/// The modes, slowest first: `name`, natural frequency, damping ratio and shape.
-pub fn mode_table(report: &SpringReport, name: fn(&ModeReport) -> &str) -> PageTable {
+/// The modes, slowest first: name, natural frequency, damping ratio and shape.
+pub(super) fn mode_table(report: &SpringReport) -> Table {
     let rows = report.modes.iter().map(|mode| {
-        let mut cells = vec![name(mode).to_owned(), format!("{:.3}", mode.frequency_hz), ratio(mode.damping_ratio)];
-        cells.extend(mode.shape.iter().map(|x| rounded(*x)));
-        cells
+        let kind = mode.kind.name();
+        let direction = mode.name.strip_prefix(kind).unwrap_or_default().trim_start();
+        let cells =
+            [kind.to_owned(), direction.to_owned(), format!("{:.3}", mode.frequency_hz), ratio(mode.damping_ratio)];
+        [&cells[..], &mode.shape.map(rounded)].concat()
     });
-    let header = ["mode", "Hz", "damping"].iter().chain(&DIRECTIONS).map(|name| (*name).to_owned());
-    PageTable { title: "Modes".to_owned(), header: header.collect(), rows: rows.collect(), ..PageTable::default() }
+    let header = ["mode", "direction", "Hz", "damping"].into_iter().chain(DIRECTIONS);
+    Table { details: vec![1], ..Table::new(header, rows) }
 }
 
 /// A stiffness matrix; N, m, rad.
-pub fn stiffness_table(title: &str, matrix: &[[f64; 6]; 6]) -> PageTable {
-    let rows = DIRECTIONS
-        .iter()
-        .zip(matrix)
-        .map(|(name, values)| std::iter::once((*name).to_owned()).chain(values.iter().map(|v| rounded(*v))).collect());
-    let header = std::iter::once(&"N, m, rad").chain(&DIRECTIONS).map(|name| (*name).to_owned());
-    PageTable { title: title.to_owned(), header: header.collect(), rows: rows.collect(), ..PageTable::default() }
+pub(super) fn stiffness_table(matrix: &[[f64; 6]; 6]) -> Table {
+    let row = |(name, values): (&str, &[f64; 6])| [&[name.to_owned()][..], &values.map(rounded)].concat();
+    Table::new(["N, m, rad"].into_iter().chain(DIRECTIONS), DIRECTIONS.into_iter().zip(matrix).map(row))
 }
 
-fn row(name: &'static str, value: String) -> Property {
-    Property { name, value }
+/// Figures of the response to a shake, in closed form and simulated.
+pub(super) fn shake_table(shaken: &ShakeResponse) -> Table {
+    let line = |name: &str, of: fn(&DesignMetrics) -> Option<f64>, decimals: usize| {
+        let number = |figures: Option<&DesignMetrics>| {
+            figures.and_then(of).map_or("-".to_owned(), |x| format!("{x:.decimals$}"))
+        };
+        vec![name.to_owned(), number(Some(&shaken.closed_form)), number(shaken.simulated.as_ref())]
+    };
+    let mut rows = vec![
+        line("elevation range of the forward beam, deg", |f| Some(f.field_of_view_deg), 1),
+        line("maximum rate, deg/s", |f| Some(f.rate_deg_per_s), 0),
+        line("stress / yield stress", |f| f.stress_share, 3),
+        line("smallest gap between coils, mm", |f| f.margins.gap_mm, 2),
+        line("clash margin", |f| f.margins.clash, 2),
+    ];
+    // Linear by definition: the simulation has none.
+    let gain = format!("{:.2}", shaken.closed_form.peak_gain);
+    rows.push(vec!["peak gain of the pitch rate".to_owned(), gain, "-".to_owned()]);
+    let of_lidar = shaken.coverage.iter().flat_map(main_values);
+    rows.extend(of_lidar.map(|(name, value)| vec![name.to_owned(), "-".to_owned(), value]));
+    Table::new(["", "closed form", "simulated"], rows)
 }
 
 /// Formats a number with three decimals, and zero without a sign.
@@ -65,14 +77,14 @@ fn rounded(x: f64) -> String {
 
 fn rest(rest: &RestReport) -> Vec<Property> {
     let sag = rest.sag_mm.map(|mm| match mm < 0.0 {
-        true => row("static extension", format!("{:.2} mm", -mm)),
-        false => row("static compression", format!("{mm:.2} mm")),
+        true => ("static extension", format!("{:.2} mm", -mm)),
+        false => ("static compression", format!("{mm:.2} mm")),
     });
     let [x, y, z] = rest.position_m.map(|m| (m * 1e4).round() * 0.1 + 0.0);
     let [roll, pitch, yaw] = rest.roll_pitch_yaw_deg.map(rounded);
     let mut rows: Vec<_> = sag.into_iter().collect();
-    rows.push(row("position at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
-    rows.push(row("roll, pitch, yaw", format!("{roll}, {pitch}, {yaw} deg")));
+    rows.push(("position at rest", format!("{x:.1}, {y:.1}, {z:.1} mm")));
+    rows.push(("roll, pitch, yaw", format!("{roll}, {pitch}, {yaw} deg")));
     rows
 }
 
@@ -89,7 +101,7 @@ fn bearing(bearing: &ElementLoad) -> Property {
         (ElementKind::Spring, Some(n)) => format!("pressed by {n:.2} N"),
         (_, Some(n)) => format!("{n:.2} N"),
     };
-    row(name, value)
+    (name, value)
 }
 
 fn coil(coil: &CoilReport) -> Vec<Property> {
@@ -115,17 +127,17 @@ fn coil(coil: &CoilReport) -> Vec<Property> {
         ["none: the coils touch", "-"].map(str::to_owned)
     };
     vec![
-        row("mean diameter", diameters),
-        row("coils", coils),
-        row("material", coil.material.name().to_owned()),
-        row("free length, solid length", format!("{:.2} mm, {:.2} mm", coil.free_length_mm, coil.solid_length_mm)),
-        row("spring index", format!("{:.2}", coil.index)),
-        row("mass of the active wire", or_dash(coil.mass_g, "g")),
-        row("axial stiffness", format!("{:.1} N/m", coil.axial_n_per_m)),
-        row("torsional stiffness", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
-        row("buckling load", buckles),
-        row("stress at rest", stress),
-        row("gap between coils", gap),
-        row("bending angle at coil contact", clash_bend),
+        ("mean diameter", diameters),
+        ("coils", coils),
+        ("material", coil.material.name().to_owned()),
+        ("free length, solid length", format!("{:.2} mm, {:.2} mm", coil.free_length_mm, coil.solid_length_mm)),
+        ("spring index", format!("{:.2}", coil.index)),
+        ("mass of the active wire", or_dash(coil.mass_g, "g")),
+        ("axial stiffness", format!("{:.1} N/m", coil.axial_n_per_m)),
+        ("torsional stiffness", format!("{:.4} N m/rad", coil.torsion_nm_per_rad)),
+        ("buckling load", buckles),
+        ("stress at rest", stress),
+        ("gap between coils", gap),
+        ("bending angle at coil contact", clash_bend),
     ]
 }

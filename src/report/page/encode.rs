@@ -10,21 +10,15 @@ use serde_json::{Value, json};
 use zsim_base::geometry::{Pose, Vector};
 
 /// The data of a run as JSON that is inert within a `<script>` element: it has no `<`, `>` or `&`.
-///
-/// # Errors
-/// When a value cannot be written as JSON.
-pub(super) fn run_json(page: &RunPage) -> Result<String, serde_json::Error> {
+pub(super) fn run_json(page: &RunPage) -> String {
     let charts: Vec<Value> = page.charts.iter().map(chart_group).collect();
     let timeline: Vec<Value> = page.timeline.iter().map(timeline_row).collect();
-    Ok(inert(&serde_json::to_string(&document(&page.view, &charts, &timeline))?))
+    inert(&document(&page.view, &charts, &timeline).to_string())
 }
 
 /// The data of a page with a view only, as [`run_json`].
-///
-/// # Errors
-/// When a value cannot be written as JSON.
-pub(super) fn view_json(view: &View) -> Result<String, serde_json::Error> {
-    Ok(inert(&serde_json::to_string(&self::view(view))?))
+pub(super) fn view_json(view: &View) -> String {
+    inert(&self::view(view).to_string())
 }
 
 /// The data of a view only.
@@ -33,19 +27,12 @@ pub(super) fn view(view: &View) -> Value {
 }
 
 /// The data of a page with charts only, as [`run_json`].
-///
-/// # Errors
-/// When a value cannot be written as JSON.
-pub(super) fn charts_json(charts: &[ChartGroup]) -> Result<String, serde_json::Error> {
-    let charts: Vec<Value> = charts.iter().map(chart_group).collect();
-    Ok(inert(&serde_json::to_string(&json!({ "charts": charts }))?))
+pub(super) fn charts_json<'a>(charts: impl Iterator<Item = &'a ChartGroup>) -> String {
+    inert(&json!({ "charts": charts.map(chart_group).collect::<Vec<_>>() }).to_string())
 }
 
 /// The data of the page of a spring, as [`run_json`].
-///
-/// # Errors
-/// When a value cannot be written as JSON.
-pub(super) fn spring_json(view: &SpringView) -> Result<String, serde_json::Error> {
+pub(super) fn spring_json(view: &SpringView) -> String {
     let mode = |mode: &ShownMode| json!({ "frequency": mode.frequency_hz, "shape": mode.shape, "shaken": mode.shaken });
     let document = json!({
         "parts": view.parts.iter().map(block).collect::<Vec<_>>(),
@@ -54,7 +41,7 @@ pub(super) fn spring_json(view: &SpringView) -> Result<String, serde_json::Error
         "centre": numbers(&view.centre_in_base),
         "modes": view.modes.iter().map(mode).collect::<Vec<_>>(),
     });
-    Ok(inert(&serde_json::to_string(&document)?))
+    inert(&document.to_string())
 }
 
 fn document(view: &View, charts: &[Value], timeline: &[Value]) -> Value {

@@ -1,8 +1,6 @@
 //! The parts of the page that are readable without scripts.
 
-use crate::quantity::{percent, time};
-use crate::{CauseMetrics, EventMetrics, Metrics, rows, verdict};
-use zsim_estimation::PartTime;
+use crate::{CauseMetrics, EventMetrics, Metrics, verdict};
 
 const SHELL: &str = include_str!("assets/page.html");
 const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));
@@ -38,7 +36,7 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
 pub(super) const LIVE: &str = "live";
 
 /// Everything that differs between pages; the shell is the same.
-pub(super) struct Document<'a> {
+pub(super) struct Page<'a> {
     /// Kind of the page, which the scripts read.
     pub kind: &'a str,
     /// Title, as text.
@@ -61,7 +59,7 @@ pub(super) struct Document<'a> {
     pub scripts: &'a [&'a str],
 }
 
-impl Document<'_> {
+impl Page<'_> {
     /// The page as one HTML file; the same values give the same bytes.
     pub fn html(&self) -> String {
         fill(
@@ -82,57 +80,6 @@ impl Document<'_> {
             ],
         )
     }
-}
-
-/// A paragraph with the result in short.
-pub(super) fn summary(text: &str) -> String {
-    format!("<p class=\"summary\">{}</p>", escaped(text))
-}
-
-/// A plot on a page.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PagePlot {
-    /// Name above the plot.
-    pub name: String,
-    /// The plot as SVG.
-    pub svg: String,
-}
-
-/// A row of a table of names and values.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NamedValue {
-    /// Name.
-    pub name: String,
-    /// Value with its unit.
-    pub value: String,
-}
-
-impl NamedValue {
-    /// A row with this name and value.
-    pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
-        Self { name: name.into(), value: value.into() }
-    }
-}
-
-/// A wider plot does not share its row with another, points.
-const BROAD_PLOT: f64 = 800.0;
-
-/// Plots, each under its name.
-pub(super) fn plots(plots: &[PagePlot]) -> String {
-    let figure = |PagePlot { name, svg }: &PagePlot| {
-        let class = if width_of(svg) > BROAD_PLOT { "drawing broad" } else { "drawing" };
-        format!(
-            "<figure class=\"{class}\" tabindex=\"0\">\n<figcaption>{}</figcaption>\n{svg}</figure>\n",
-            escaped(name)
-        )
-    };
-    format!("<div class=\"drawings\">\n{}</div>\n", plots.iter().map(figure).collect::<String>())
-}
-
-/// Width of an SVG by its first attribute of that name; 0 without one.
-fn width_of(svg: &str) -> f64 {
-    let rest = svg.split_once(" width=\"").map_or("", |(_, rest)| rest);
-    rest.split('"').next().and_then(|width| width.parse().ok()).unwrap_or(0.0)
 }
 
 /// Escapes text with code between backticks, as in Markdown.
@@ -197,34 +144,6 @@ fn list(title: &str, lines: &[String]) -> String {
     format!("<h3>{title}</h3>\n<ul>\n{items}</ul>\n")
 }
 
-/// The metrics in groups, and the run time of each part of the estimator.
-pub(super) fn metrics_tables(metrics: &Metrics, parts: &[PartTime]) -> String {
-    let mut html = String::new();
-    for group in rows::groups(metrics) {
-        let rows = group.rows.into_iter().map(|row| NamedValue::new(row.name, row.value));
-        html += &table(group.title, rows);
-    }
-    let total_s = metrics.open_loop.wall_s.filter(|wall_s| *wall_s > 0.0);
-    let part = |PartTime { name, seconds }: &PartTime| {
-        let share = total_s.map_or_else(String::new, |total_s| format!(" ({})", percent(seconds / total_s)));
-        NamedValue::new(*name, time(*seconds) + &share)
-    };
-    if !parts.is_empty() {
-        html += &table("open loop, by part", parts.iter().map(part));
-    }
-    html
-}
-
-/// A table of names and values.
-pub(super) fn table(title: &str, rows: impl Iterator<Item = NamedValue>) -> String {
-    let rows: String = rows
-        .map(|NamedValue { name, value }| {
-            format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escaped(&name), escaped(&value))
-        })
-        .collect();
-    format!("<table>\n<caption>{}</caption>\n{rows}</table>\n", escaped(title))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -232,14 +151,6 @@ mod tests {
     #[test]
     fn a_value_is_not_filled_again() {
         assert_eq!(fill("a {{x}} b {{y}} c", &[("x", "{{y}}"), ("y", "2")]), "a {{y}} b 2 c");
-    }
-
-    #[test]
-    fn a_broad_figure_has_its_own_row() {
-        let of_width = |width: &str| {
-            plots(&[PagePlot { name: "a".into(), svg: format!("<svg viewBox=\"0 0 9 9\" width=\"{width}\"></svg>") }])
-        };
-        assert!(of_width("1180").contains("class=\"drawing broad\"") && of_width("720").contains("class=\"drawing\""));
     }
 
     #[test]

@@ -40,14 +40,11 @@ impl LivePage {
     }
 
     /// The HTML of the page.
-    ///
-    /// # Errors
-    /// When a value cannot be written as JSON.
-    pub fn html(&self) -> Result<String, serde_json::Error> {
+    pub fn html(&self) -> String {
         let view = stage::view_section("Trajectory and map so far", "estimate", "head");
         let verdicts: String = ["good", "degraded", "lost"].map(|status| html::verdict_line(status, "")).concat();
         let scripts = [&scripts::VIEW[..], &[SCRIPT]].concat();
-        Ok(html::Document {
+        html::Page {
             kind: html::LIVE,
             title: &self.title,
             status: "",
@@ -56,19 +53,19 @@ impl LivePage {
             sections: &(view + EVENTS),
             footer: "Points are thinned for this page; the report and cloud.ply have all of them.",
             version: env!("CARGO_PKG_VERSION"),
-            data: &self.data()?,
+            data: &self.data(),
             scripts: &scripts,
         }
-        .html())
+        .html()
     }
 
     /// The data of the view, without points; their codes refer to the volume.
-    fn data(&self) -> Result<String, serde_json::Error> {
+    fn data(&self) -> String {
         let mut data = encode::view(&self.view);
         data["cloud"]["lower"] = json!(encode::numbers(&self.volume.lower));
         data["cloud"]["upper"] = json!(encode::numbers(&self.volume.upper));
         data["cloud"]["duration"] = json!(Volume::duration_s());
         data["capacity"] = json!({ "points": MAX_PAGE_POINTS, "poses": MAX_PAGE_POSES });
-        Ok(encode::inert(&serde_json::to_string(&data)?))
+        encode::inert(&data.to_string())
     }
 }

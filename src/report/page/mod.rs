@@ -1,39 +1,32 @@
 //! Interactive pages, each one HTML file without external resources.
 //!
 //! The page of a run has the verdict, a three-dimensional view, interactive charts, the metrics and the manifest; that of a
-//! scene the view, the floor plan and the materials; that of a study its tables, plots and runs; that of the paper's
-//! experiments their tables and plots; that of a gain measurement gain and phase of each axis; that of a spring head and linkage
-//! to scale, modes and stiffness. Scripts, style sheets and data are in the file. A content security policy forbids network
-//! access. The page of a run that is not complete is an exception: it requests updates from the server that it is from.
+//! scene the view, the floor plan and the materials; that of a document its parts, of which one may be interactive.
+//! Scripts, style sheets and data are in the file. A content security policy forbids network access. The page of a run that is not complete is an exception: it requests updates from the server that it is from.
 
-mod benchmark;
 mod binary;
 mod data;
+mod document;
 mod encode;
-mod gains;
 mod html;
+mod interactive;
 pub mod links;
 mod live;
-mod paper;
 mod points;
 mod quantise;
 mod scene;
 mod scripts;
-mod spring;
 mod stage;
-mod study;
 mod surfaces;
 mod table;
 mod update;
 
 use crate::rows;
-pub use benchmark::BenchmarkPage;
 pub use data::{
     Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Link, Ordinate, RunPage, Section, ShownMode,
     SpringView, TimedPose, TimelineRow, View, ViewPoint,
 };
-pub use gains::{AxisGains, GainsPage};
-pub use html::{NamedValue, PagePlot};
+pub use interactive::{AxisGains, Interactive, MAX_PAGE_RUNS};
 pub use live::LivePage;
 
 /// Maximum number of points of the cloud on a page.
@@ -45,33 +38,26 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 /// Maximum number of poses of a path on a page; one takes 32 bytes, 43 in base64.
 pub const MAX_PAGE_POSES: usize = 20_000;
 
-pub use paper::{ExperimentSection, PageLink, PaperPage};
 pub use points::{PointColumn, RunPoints};
-pub use scene::{MaterialRow, ScenePage};
-pub use spring::{NotedTable, SpringPage};
-pub use study::{MAX_PAGE_RUNS, StudyPage};
+pub use scene::ScenePage;
 pub use surfaces::static_surfaces;
 pub(crate) use surfaces::{Triangle, area_m2, largest};
-pub use table::PageTable;
 pub use update::{Increment, LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TruePoses, Volume};
 
 const RUN_SECTIONS: &str = include_str!("assets/run.html");
 impl RunPage<'_> {
     /// The HTML of the page; the same data give the same bytes.
-    ///
-    /// # Errors
-    /// When a value cannot be written as JSON.
-    pub fn html(&self) -> Result<String, serde_json::Error> {
+    pub fn html(&self) -> String {
         let metrics = self.metrics;
         let sections = html::fill(
             RUN_SECTIONS,
             &[
-                ("metrics", &html::metrics_tables(metrics, &self.parts)),
+                ("metrics", &table::metrics_tables(metrics, &self.parts)),
                 ("events", &html::events(metrics)),
                 ("manifest", &html::escaped(self.manifest)),
             ],
         );
-        Ok(html::Document {
+        html::Page {
             kind: "run",
             title: &rows::title(metrics),
             status: metrics.status.as_deref().unwrap_or_default(),
@@ -80,10 +66,10 @@ impl RunPage<'_> {
             sections: &(stage::view_section("Trajectory and cloud", "estimate", "head") + &sections),
             footer: "Lines of the charts mark the time of the view; click on a chart to move to that time.",
             version: &metrics.version,
-            data: &encode::run_json(self)?,
+            data: &encode::run_json(self),
             scripts: &scripts::VIEW,
         }
-        .html())
+        .html()
     }
 }
 

@@ -95,18 +95,20 @@ impl Figure {
         Ok(raster.downsampled(OVERSAMPLING))
     }
 
-    /// Writes `NAME.svg` and `NAME.png` into `folder`.
+    /// Writes `NAME.svg` and `NAME.png` into `folder`, and returns the SVG.
     ///
     /// # Errors
     /// When the figure cannot be drawn, or a file cannot be written.
-    pub fn save(&self, folder: &Path, name: &str) -> Result<(), PlotError> {
+    pub fn save(&self, folder: &Path, name: &str) -> Result<String, PlotError> {
         let write = |ending: &str, bytes: &[u8]| {
             let path = folder.join(format!("{name}.{ending}"));
             let written = files::create(&path).and_then(|mut file| file.write_all(bytes));
             written.map_err(|source| PlotError::File { path: path.display().to_string(), source })
         };
-        write("svg", self.svg()?.as_bytes())?;
-        write("png", &self.raster()?.png()?)
+        let svg = self.svg()?;
+        write("svg", svg.as_bytes())?;
+        write("png", &self.raster()?.png()?)?;
+        Ok(svg)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The page of a scene.
 
 use super::plan::{DEFAULT_CUT_M, plan};
-use crate::page::{MaterialRow, NamedValue, ScenePage, TimedPose, Triangle, View, area_m2, largest};
+use crate::Table;
+use crate::page::{ScenePage, TimedPose, Triangle, View, area_m2, largest};
 use crate::plot::PlotError;
 use zsim_base::geometry::{Pose, Route, Vector};
 use zsim_world::{MaterialId, World};
@@ -14,7 +15,7 @@ const HEAD_HEIGHT_M: f64 = 1.0;
 /// The page of a scene as HTML; movers are where they are at the start of a run.
 ///
 /// # Errors
-/// When the plan cannot be drawn, or a value cannot be written as JSON.
+/// When the plan cannot be drawn.
 pub fn page(world: &World) -> Result<String, PlotError> {
     let all: Vec<(Triangle, MaterialId)> = world.triangles().chain(world.moving_triangles(0.0)).collect();
     let page = ScenePage {
@@ -54,35 +55,30 @@ fn walk(route: &Route) -> Vec<TimedPose> {
         .collect()
 }
 
-/// The materials in use, the largest area first.
-fn materials(world: &World, triangles: &[(Triangle, MaterialId)]) -> Vec<MaterialRow> {
-    let mut rows: Vec<MaterialRow> = world
-        .materials()
-        .iter()
-        .map(|material| MaterialRow {
-            name: material.name.clone(),
-            reflectance: material.reflectance,
-            transmission: material.transmission,
-            area_m2: 0.0,
-        })
-        .collect();
-    triangles.iter().for_each(|(triangle, material)| rows[material.index()].area_m2 += area_m2(triangle));
-    rows.retain(|row| row.area_m2 > 0.0);
-    rows.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
-    rows
+/// The materials in use with their areas, the largest first.
+fn materials(world: &World, triangles: &[(Triangle, MaterialId)]) -> Table {
+    let mut areas_m2 = vec![0.0; world.materials().len()];
+    triangles.iter().for_each(|(triangle, material)| areas_m2[material.index()] += area_m2(triangle));
+    let mut used: Vec<_> = world.materials().iter().zip(areas_m2).filter(|(_, area_m2)| *area_m2 > 0.0).collect();
+    used.sort_by(|a, b| b.1.total_cmp(&a.1));
+    Table::facts(used.into_iter().map(|(material, area_m2)| {
+        let through = material.transmission;
+        let transmission = if through > 0.0 { format!(", transmits {through:.2}") } else { String::new() };
+        (&*material.name, format!("reflectance {:.2}{transmission}, {area_m2:.0} m\u{b2}", material.reflectance))
+    }))
 }
 
-fn properties(world: &World, triangles: usize) -> Vec<NamedValue> {
+fn properties(world: &World, triangles: usize) -> Table {
     let (lower, upper) = world.bounds();
     let size = upper - lower;
     let mut rows = vec![
-        NamedValue::new("size in x, y, z", format!("{:.1} x {:.1} x {:.1} m", size.x, size.y, size.z)),
-        NamedValue::new("triangles", triangles.to_string()),
+        ("size in x, y, z".to_owned(), format!("{:.1} x {:.1} x {:.1} m", size.x, size.y, size.z)),
+        ("triangles".to_owned(), triangles.to_string()),
     ];
     for (name, route) in world.routes() {
         let length_m = walk(route).last().map_or(0.0, |last| last.t_s * WALK_M_PER_S);
         let kind = if route.closed { "closed" } else { "open" };
-        rows.push(NamedValue::new(format!("route {name}"), format!("{length_m:.1} m, {kind}")));
+        rows.push((format!("route {name}"), format!("{length_m:.1} m, {kind}")));
     }
-    rows
+    Table::facts(rows)
 }

@@ -10,21 +10,21 @@
 //! estimated, and the Pareto set of all goals is taken from it.
 
 mod catalogue;
+mod document;
 mod evaluation;
 mod journey;
 mod limits;
 mod optimise;
 mod outcome;
-mod output;
 mod search;
 mod space;
 mod spec;
 mod verified;
 
 pub use catalogue::catalogue;
+pub use document::{csv, document, pareto_figure, rejected_csv};
 pub use evaluation::Candidate;
 pub use limits::{BuildLimitsSpec, Violation, WireStock};
-pub use output::{csv, pareto_figure, rejected_csv};
 pub use search::{DesignSearch, DesignStudy, Exploration};
 pub use spec::{CoilDesign, DesignJourneySpec, DesignSpec, SpaceSpec};
 pub use verified::{Rejection, VerifiedDesign};

@@ -9,11 +9,11 @@
 //! bootstrap yields 95 % confidence intervals. The minimum of a parabola fitted to the squared error over the latency is
 //! the best latency, which should be zero.
 
+mod document;
 mod figure;
-mod output;
 mod result;
 
+pub(super) use document::conclusions;
+pub use document::{csv, document};
 pub use figure::{curve_figure, map_figure};
-pub(super) use output::conclusions;
-pub use output::{csv, text_table};
 pub use result::{LatencyResult, LatencyRun, Minimum, Recovery};

@@ -3,7 +3,7 @@
 use super::table::{Column, ColumnType};
 use super::{Measure, Plan, Sweep};
 use crate::StudyError;
-use zsim_report::page::PageTable;
+use zsim_report::{Document, Table};
 use zsim_run::large_error_m;
 
 /// Name of the axis of fault lists, and its level without faults.
@@ -102,13 +102,16 @@ fn text_axes(plan: &Plan) -> Vec<String> {
 }
 
 impl IntegrityReport {
-    /// Two tables: reliability of verdicts and bounds, and the worst runs that are not lost.
-    pub fn tables(&self) -> [PageTable; 2] {
-        [self.reliability(), self.worst_runs()]
+    /// Adds two tables: reliability of verdicts and bounds, and the worst runs that are not lost.
+    pub fn add_to(&self, document: &mut Document) {
+        document.heading("Integrity: verdicts and bounds against true errors");
+        document.add(self.reliability());
+        document.heading(format!("The {MAX_LISTED_RUNS} worst runs that are not lost"));
+        document.add(self.worst_runs());
     }
 
     /// Reliability of verdicts and bounds, without and with faults.
-    fn reliability(&self) -> PageTable {
+    fn reliability(&self) -> Table {
         let clean: Vec<&RunIntegrity> = self.runs.iter().filter(|run| !run.is_faulted).collect();
         let faulted: Vec<&RunIntegrity> = self.runs.iter().filter(|run| run.is_faulted).collect();
         let row = |name: &str, figure: &dyn Fn(&[&RunIntegrity]) -> String| {
@@ -133,13 +136,11 @@ impl IntegrityReport {
                 percentage(runs, |run| run.aligned_rmse_m < SMALL_ERROR_M, |run| run.status == 2.0)
             }),
         ];
-        let header = ["", "without faults", "with faults"].map(str::to_owned).to_vec();
-        let title = "Integrity: verdicts and bounds against true errors".to_owned();
-        PageTable { title, header, rows, ..PageTable::default() }
+        Table::new(["", "without faults", "with faults"], rows)
     }
 
     /// Runs that are not lost, ordered by the fraction within the bound, then by error.
-    fn worst_runs(&self) -> PageTable {
+    fn worst_runs(&self) -> Table {
         let mut runs: Vec<&RunIntegrity> = self.runs.iter().filter(|run| run.status < 2.0).collect();
         runs.sort_by(|a, b| {
             let uncovered =
@@ -155,15 +156,9 @@ impl IntegrityReport {
             cells.push(format!("{:.1}", run.within_bound * 1e2));
             cells
         };
-        let mut header = vec!["run".to_owned()];
-        header.extend(self.axes.iter().cloned());
-        header.extend(["verdict", "error mm", "median bound mm", "within %"].map(str::to_owned));
-        PageTable {
-            title: format!("The {MAX_LISTED_RUNS} worst runs that are not lost"),
-            header,
-            rows: runs.iter().take(MAX_LISTED_RUNS).map(row).collect(),
-            ..PageTable::default()
-        }
+        let header = ["run"].into_iter().chain(self.axes.iter().map(String::as_str));
+        let header = header.chain(["verdict", "error mm", "median bound mm", "within %"]);
+        Table::new(header, runs.iter().take(MAX_LISTED_RUNS).map(row))
     }
 }
 

@@ -10,20 +10,15 @@ use zsim_base::files::FileError;
 use zsim_base::files::subfolder;
 use zsim_base::files::write_text;
 use zsim_report::plot::{Chart, Colour, Figure, Mark, Series, Tick, robust_range};
-use zsim_report::quantity_name;
+use zsim_report::{Plot, Table, quantity_name};
 
 /// Ticks of the logarithmic ratio axis.
 const RATIO_TICKS: [f64; 15] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 0.7, 1.0, 1.4, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 /// Maximum number of dots in a plot; more are subsampled evenly to limit the size of the SVG.
 const MAX_DOTS: usize = 5_000;
 
-/// A plot in `plots/`.
-pub(super) struct PlotFile {
-    /// Name of the files, without ending.
-    pub name: String,
-    /// Title on the page.
-    pub title: String,
-}
+/// Plots above this total size have no picture on the page, bytes: it stays below 12 MB.
+const MAX_PLOTS_BYTES: usize = 8_000_000;
 
 /// The Pareto front of the runs.
 pub(super) struct Front {
@@ -40,14 +35,16 @@ impl Sweep {
     ///
     /// # Errors
     /// If the table is not merged, or if a file cannot be written.
-    pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<PlotFile>, StudyError> {
+    pub(super) fn draw(&self, summary: &Summary) -> Result<Vec<Plot>, StudyError> {
         let folder = subfolder(&self.folder, "plots").map_err(FileError::at(&self.folder))?;
         let runs = Runs::read(self)?;
-        let mut plots = Vec::new();
-        let mut save = |name: String, title: String, figure: Figure| {
-            let saved = figure.save(&folder, &name);
-            plots.push(PlotFile { name, title });
-            saved
+        let (mut plots, mut bytes) = (Vec::new(), 0);
+        let mut save = |file: String, name: String, figure: Figure| -> Result<(), StudyError> {
+            let svg = figure.save(&folder, &file)?;
+            bytes += svg.len();
+            let svg = if bytes <= MAX_PLOTS_BYTES { svg } else { String::new() };
+            plots.push(Plot { name, address: format!("plots/{file}.svg"), svg });
+            Ok(())
         };
         if let Some(front) = self.front(&runs)? {
             self.write_front(&runs, &front)?;
@@ -109,18 +106,15 @@ impl Sweep {
     fn write_front(&self, runs: &Runs, front: &Front) -> Result<(), StudyError> {
         let goals = &self.plan.spec().front;
         let axes = self.plan.axes().iter().map(|axis| axis.name.as_str());
-        let names: Vec<&str> =
-            std::iter::once("point").chain(axes).chain(goals.iter().map(|goal| goal.measure.key())).collect();
-        let mut text = names.join(",") + "\n";
-        for row in &front.optimal {
+        let header = ["point"].into_iter().chain(axes).chain(goals.iter().map(|goal| goal.measure.key()));
+        let row = |row: &usize| {
             let number = runs.numbers[*row];
             let settings = self.plan.settings(number).into_iter().map(|setting| setting.to_string());
-            let cells = std::iter::once(number.to_string()).chain(settings);
-            let cells: Vec<String> = cells.chain(front.columns.iter().map(|column| column[*row].to_string())).collect();
-            text += &(cells.join(",") + "\n");
-        }
-        let path = self.folder.join("front.csv");
-        Ok(write_text(&self.temporary(), &path, &text)?)
+            let figures = front.columns.iter().map(|column| column[*row].to_string());
+            std::iter::once(number.to_string()).chain(settings).chain(figures).collect()
+        };
+        let table = Table::new(header, front.optimal.iter().map(row));
+        Ok(write_text(&self.temporary(), &self.folder.join("front.csv"), &table.csv())?)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Report of a merged sweep: summary tables and plots.
 
-use super::integrity::IntegrityReport;
-use super::output::{csv, markdown, text, trends_csv};
+use super::levels::{csv, trends_csv};
 use super::{Summary, Sweep, SweepStatus};
 use crate::StudyError;
 use crate::latency::LatencyResult;
@@ -14,7 +13,7 @@ pub struct MergedReport {
     pub status: SweepStatus,
     /// Summary of the runs.
     pub summary: Summary,
-    /// The summary as tables for the terminal.
+    /// The result for the terminal.
     pub text: String,
     /// The latency study; `None` if the runs have no timing errors, or if a run failed or is missing.
     pub latency: Option<LatencyResult>,
@@ -35,24 +34,17 @@ impl Sweep {
             return Err(StudyError::Plan { what: "sweep", message });
         }
         let summary = self.summary()?;
-        let integrity = self.integrity_report()?;
-        let integrity_tables = integrity.iter().flat_map(IntegrityReport::tables);
-        let page = markdown(&summary, &self.plan, &status)
-            + &integrity_tables.map(|table| table.markdown()).collect::<String>();
-        let mut files = vec![("summary.csv", csv(&summary)), ("study.md", page)];
+        let document = self.document(&summary, &status, self.draw(&summary)?)?;
+        let mut files =
+            vec![("summary.csv", csv(&summary)), ("study.md", document.markdown("")), ("report.html", document.html())];
         if !summary.trends.is_empty() {
             files.push(("trends.csv", trends_csv(&summary)));
         }
         for (name, text) in files {
             write_text(&self.temporary(), &self.folder.join(name), &text)?;
         }
-        let plots = self.draw(&summary)?;
-        let page = self.page(&summary, &status, integrity.as_ref(), &plots)?;
-        write_text(&self.temporary(), &self.folder.join("report.html"), &page.html())?;
         let latency = self.latency_result()?;
         latency.as_ref().map_or(Ok(()), |study| self.write_latency(study))?;
-        let integrity_tables = integrity.iter().flat_map(IntegrityReport::tables);
-        let text = text(&summary, &self.plan) + &integrity_tables.map(|table| table.text()).collect::<String>();
-        Ok(MergedReport { status, summary, text, latency })
+        Ok(MergedReport { status, summary, text: document.text(), latency })
     }
 }

@@ -83,11 +83,6 @@ impl Column {
     }
 }
 
-/// Quotes text for CSV where needed (RFC 4180).
-pub(crate) fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
-}
-
 /// Writer of a table.
 pub(super) struct TableWriter {
     writer: Writer<AtomicFile>,

@@ -1,36 +1,55 @@
-//! The page of a gain measurement.
+//! The result of a gain measurement as a document.
 
 use super::bode::LOWEST_SHARE;
 use super::curve::{MIN_COHERENCE, SIGMAS_95};
-use super::{GainCurve, GainPoint, SwingStudy, axis_name, peak_table, swing_figure};
-use crate::HeadError;
+use super::table::{name_of, peak_table, swing_table};
+use super::{GainCurve, GainPoint, SwingStudy, axis_name, swing_figure};
 use std::f64::consts::TAU;
 use zsim_dynamics::HeadModel;
 use zsim_motion::Axis;
-use zsim_report::page::{Abscissa, AxisGains, Chart, Curve, CurveStyle, GainsPage, Ordinate, PagePlot, PageTable};
+use zsim_report::page::{Abscissa, AxisGains, Chart, ChartGroup, Curve, CurveStyle, Interactive, Ordinate, Section};
+use zsim_report::plot::PlotError;
+use zsim_report::{Content, Document, Plot, Table};
 
 /// Maximum number of frequencies of a chart; more are thinned, and the largest gain of each interval is kept.
 const MAX_LINES: usize = 2_000;
 
-/// The page of a gain measurement as HTML; the same curves give the same bytes.
-///
-/// `name` is the name of the head.
+/// The result of a gain measurement of the head `name`.
 ///
 /// # Errors
-/// When a plot fails, or a value cannot be written as JSON.
-pub fn page(name: &str, head: &HeadModel, curves: &[GainCurve], swings: &[SwingStudy]) -> Result<String, HeadError> {
-    let plots = match swings {
-        [] => Vec::new(),
-        swings => vec![PagePlot { name: "By swing amplitude".to_owned(), svg: swing_figure(swings).svg()? }],
-    };
-    let page = GainsPage {
-        name: name.to_owned(),
-        summary: summary(head, curves),
-        tables: vec![peak_table(curves), modes(head)],
-        axes: curves.iter().map(axis_gains).collect(),
-        plots,
-    };
-    Ok(page.html()?)
+/// When a plot fails.
+pub fn document(
+    name: &str,
+    head: &HeadModel,
+    curves: &[GainCurve],
+    swings: &[SwingStudy],
+) -> Result<Document, PlotError> {
+    let mut document = Document::new(format!("Gains of {name}"), summary(head, curves));
+    document.heading("Highest peak of each axis");
+    document.add(peak_table(curves));
+    document.heading("Modes of the head at rest");
+    document.add_detail(modes(head));
+    document.add_detail(Interactive::Gains(curves.iter().map(axis_gains).collect()));
+    if !swings.is_empty() {
+        document.heading("By swing amplitude");
+        document.add(swing_table(swings));
+        let ends =
+            swings.iter().filter_map(|study| Some(format!("{}: ended {}", name_of(study.axis), study.ended.as_ref()?)));
+        document.add(Content::List(ends.collect()));
+        let svg = swing_figure(swings).svg()?;
+        let (name, address) = ("By swing amplitude".to_owned(), "plots/swing.svg".to_owned());
+        document.add(Content::Plots(vec![Plot { name, address, svg }]));
+    }
+    let contacts = curves.iter().map(|curve| (curve.axis, curve.coil_contact));
+    let in_swings = swings.iter().flat_map(|study| study.points.iter().map(|p| (study.axis, p.coil_contact)));
+    let warnings = contacts.chain(in_swings).filter_map(|(axis, contact)| Some((axis, contact?)));
+    let warnings = warnings.map(|(axis, contact)| format!("{}: {}", name_of(axis), contact.warning())).collect();
+    document.heading("Warnings");
+    document.add(Content::List(warnings));
+    document.footer =
+        "Charts: drag to zoom, double-click to zoom out, arrow keys move the cursor. All values are in gains.csv."
+            .to_owned();
+    Ok(document)
 }
 
 /// Natural frequencies, the highest peak, and the difference between simulation and closed form.
@@ -50,7 +69,7 @@ fn summary(head: &HeadModel, curves: &[GainCurve]) -> String {
 }
 
 /// The modes, slowest first.
-fn modes(head: &HeadModel) -> PageTable {
+fn modes(head: &HeadModel) -> Table {
     let rows = head.linear_modes().iter().map(|mode| {
         vec![
             mode.kind.name().to_owned(),
@@ -59,8 +78,7 @@ fn modes(head: &HeadModel) -> PageTable {
             format!("{:.4}", mode.damping_ratio),
         ]
     });
-    let header = ["mode", "natural Hz", "damped Hz", "damping ratio"].map(str::to_owned).to_vec();
-    PageTable { title: "Modes of the head at rest".to_owned(), header, rows: rows.collect(), ..PageTable::default() }
+    Table::new(["mode", "natural Hz", "damped Hz", "damping ratio"], rows)
 }
 
 /// Quantity and direction of an axis.
@@ -78,10 +96,12 @@ fn axis_title(axis: Axis) -> &'static str {
 fn axis_gains(curve: &GainCurve) -> AxisGains {
     let points = with_model_peak(&thinned(&curve.points), curve);
     let title = axis_title(curve.axis);
+    let axis = axis_name(curve.axis);
+    let groups = [vec![gain_chart(&points)], vec![phase_chart(&points), coherence_chart(&points)]];
     AxisGains {
-        axis: axis_name(curve.axis),
+        axis,
         title: title[..1].to_uppercase() + &title[1..],
-        charts: vec![vec![gain_chart(&points)], vec![phase_chart(&points), coherence_chart(&points)]],
+        groups: groups.map(|charts| ChartGroup { section: Section::Axis(axis), charts }).into(),
     }
 }
 

@@ -1,79 +1,56 @@
-//! The page of a merged sweep.
+//! The result of a merged sweep as a document.
 
-use super::integrity::IntegrityReport;
-use super::output::{digits, heading, legend, tables};
-use super::plots::PlotFile;
+use super::levels::{add_tables, digits, heading};
 use super::runs::Runs;
 use super::{Measure, Summary, Sweep, SweepStatus};
 use crate::StudyError;
-use zsim_base::files::FileError;
-use zsim_report::page::{MAX_PAGE_RUNS, PagePlot, PageTable, PointColumn, RunPoints, StudyPage};
-use zsim_report::{axis_label, quantity_name};
-
-/// Plots above this total size are left to the folder `plots/`, bytes: the page stays below 12 MB.
-const MAX_PLOTS_BYTES: usize = 8_000_000;
+use zsim_report::page::{Interactive, MAX_PAGE_RUNS, PointColumn, RunPoints};
+use zsim_report::{Content, Document, Plot, Table, axis_label, quantity_name};
 
 /// Maximum number of runs of the front on the page in addition to the first [`MAX_PAGE_RUNS`] runs.
 const MAX_LATER_RUNS: usize = 500;
 
 impl Sweep {
-    /// The page of the merged runs, with the given plots.
+    /// The result of the merged runs, with the given plots.
     ///
     /// # Errors
     /// If the table is not merged, or if a file cannot be read.
-    pub(super) fn page(
+    pub(super) fn document(
         &self,
         summary: &Summary,
         status: &SweepStatus,
-        integrity: Option<&IntegrityReport>,
-        plots: &[PlotFile],
-    ) -> Result<StudyPage, StudyError> {
-        let of_axes = tables(summary, &self.plan, true).into_iter();
-        let of_integrity = integrity.map(IntegrityReport::tables).into_iter().flatten();
-        let tables = of_integrity.chain(of_axes);
+        plots: Vec<Plot>,
+    ) -> Result<Document, StudyError> {
+        let (points, failed, missing) = (status.points, status.failed, status.missing);
+        let version = env!("CARGO_PKG_VERSION");
+        let written = format!("Written by zsim {version}: {points} runs, {failed} of them failed, {missing} missing.");
+        let mut document = Document::new(self.plan.name(), written);
+        add_tables(&mut document, summary, &self.plan);
+        self.integrity_report()?.iter().for_each(|report| report.add_to(&mut document));
+        document.heading("Plots");
+        document.add(Content::Plots(plots));
         let runs = Runs::read(self)?;
         let front = self.front(&runs)?.map_or_else(Vec::new, |front| front.optimal);
         let shown = shown_rows(runs.numbers.len(), &front);
-        let left_out = runs.numbers.len() - shown.len();
-        let runs_note = match left_out {
+        let note = match runs.numbers.len() - shown.len() {
             0 => String::new(),
-            _ => {
+            left_out => {
                 format!("The table has the first {MAX_PAGE_RUNS} runs and the front; {left_out} more are in table.csv.")
             }
         };
-        Ok(StudyPage {
-            name: self.plan.name().to_owned(),
-            introduction: format!(
-                "{} runs, {} of them failed, {} missing. {}",
-                status.points,
-                status.failed,
-                status.missing,
-                legend(summary, "Medians (quartiles).")
-            ),
-            tables: tables.collect(),
-            plots: self.page_plots(plots)?,
+        document.add_detail(Interactive::Runs {
             runs: self.page_runs(&summary.measures, &runs, &shown)?,
-            runs_note,
+            note,
             points: self.page_points(&summary.measures, &runs, &shown, &front)?,
-        })
-    }
-
-    /// The plots as SVG, each with its title, as far as there is room.
-    fn page_plots(&self, plots: &[PlotFile]) -> Result<Vec<PagePlot>, StudyError> {
-        let (mut shown, mut bytes) = (Vec::new(), 0);
-        for PlotFile { name, title } in plots {
-            let path = self.folder.join("plots").join(format!("{name}.svg"));
-            let svg = std::fs::read_to_string(&path).map_err(FileError::at(&path))?;
-            bytes += svg.len();
-            if bytes <= MAX_PLOTS_BYTES {
-                shown.push(PagePlot { name: title.clone(), svg });
-            }
-        }
-        Ok(shown)
+        });
+        document.footer = "Click on a column's name to sort by it, and on a run to open or repeat it. Plots are also in the folder plots/, all \
+                           figures in table.csv and summary.csv."
+            .to_owned();
+        Ok(document)
     }
 
     /// Settings and figures of the shown runs; those that are kept link to their pages.
-    fn page_runs(&self, measures: &[Measure], runs: &Runs, shown: &[usize]) -> Result<PageTable, StudyError> {
+    fn page_runs(&self, measures: &[Measure], runs: &Runs, shown: &[usize]) -> Result<Table, StudyError> {
         let columns: Vec<Vec<f64>> = measures.iter().map(|measure| self.figures(*measure)).collect::<Result<_, _>>()?;
         let has_seeds = !self.plan.spec().seeds.is_empty();
         let header = std::iter::once("run".to_owned())
@@ -88,12 +65,8 @@ impl Sweep {
                 measures.iter().zip(&columns).map(|(measure, column)| digits(column[*row] * measure.unit().1));
             std::iter::once(number.to_string()).chain(settings).chain(seed).chain(figures).collect()
         };
-        Ok(PageTable {
-            title: "Runs".to_owned(),
-            header: header.collect(),
-            rows: shown.iter().map(row).collect(),
-            links: shown.iter().map(|row| self.page_of_run(runs.numbers[*row])).collect(),
-        })
+        let links = shown.iter().map(|row| self.page_of_run(runs.numbers[*row])).collect();
+        Ok(Table { links, ..Table::new(header, shown.iter().map(row)) })
     }
 
     /// The shown runs as points: numeric axes, then measures; at first over the goals, or else the first two measures.

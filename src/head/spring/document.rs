@@ -1,35 +1,54 @@
-//! The page of a spring, or another linkage, under a head.
+//! The report on a spring, or another linkage, under a head as a document.
 
 use super::excited_mode::{ExcitedMode, along_axes};
 use super::mode_figure::{displayed_shape, ratio};
-use super::{CoilReport, RestReport, Shake, SpringReport, mode_name, mode_table, properties, stiffness_table};
+use super::tables::{mode_table, properties, shake_table, stiffness_table};
+use super::{CoilReport, RestReport, Shake, SpringReport, mode_name};
 use crate::HeadError;
 use zsim_base::geometry::{Pose, Vector};
 use zsim_dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, PartSpec};
 use zsim_elasticity::SpringDesign;
 use zsim_motion::Axis;
-use zsim_report::page::links;
-use zsim_report::page::{NamedValue, NotedTable, PageTable, ShownMode, SpringPage, SpringView};
+use zsim_report::Document;
+use zsim_report::page::{Interactive, ShownMode, SpringView, links};
 
-/// The page as HTML; the same report gives the same bytes.
+/// The report on a spring, or another linkage, under a head.
 ///
 /// `name` is the name of the head, or of spring and head. `head` is `None` for a head without a stable rest pose.
 ///
 /// # Errors
-/// When the spring of the spec is invalid, or a value cannot be written as JSON.
-pub fn page(name: &str, spec: &HeadSpec, head: Option<&HeadModel>, report: &SpringReport) -> Result<String, HeadError> {
-    let view = match head {
+/// When the spring of the spec is invalid.
+pub fn document(
+    name: &str,
+    spec: &HeadSpec,
+    head: Option<&HeadModel>,
+    report: &SpringReport,
+) -> Result<Document, HeadError> {
+    let mut document = Document::new(format!("Spring and modes of {name}"), summary(report));
+    "All values are in spring.json.".clone_into(&mut document.footer);
+    document.add_detail(Interactive::Spring(match head {
         Some(head) => view_at_rest(spec, head, report),
         None => view_of_fallen(spec)?,
-    };
-    let page = SpringPage {
-        title: format!("Spring and modes of {name}"),
-        summary: summary(report),
-        view,
-        tables: tables(head, report),
-        properties: properties(report).into_iter().map(|row| NamedValue::new(row.name, row.value)).collect(),
-    };
-    Ok(page.html()?)
+    }));
+    document.heading("Load and limits");
+    document.add(properties(report));
+    report.falls_because.iter().for_each(|why| document.add(why.as_str()));
+    if !report.modes.is_empty() {
+        document.heading("Modes");
+        document.add(mode_table(report));
+        document.add_detail(
+            "Undamped frequency. The shape is the displacement of the centre of mass (m) and the rotation (rad) in the axes of the \
+             base; its largest entry is 1. In the picture, modes of the same kind within 1 % in frequency are turned to the axes.",
+        );
+    }
+    add_stiffness(&mut document, head, report);
+    if let Some(shaken) = &report.shaken {
+        let at = shaken.shake.frequency_hz.map_or("the slowest mode".to_owned(), |hz| format!("{hz:.2} Hz"));
+        document.heading(format!("Response to a nod by {}\u{b0} at {at}", shaken.shake.pitch_deg));
+        document.add(shake_table(shaken));
+        shaken.failed.iter().for_each(|why| document.add(format!("No simulation: {why}")));
+    }
+    Ok(document)
 }
 
 /// Free length, length under load, lowest frequency, and the margin to buckling or coil contact.
@@ -168,29 +187,24 @@ fn shake_in_words(head: &HeadModel, shake: &Shake) -> String {
     format!("a nod of the base by {}\u{b0} at {:.2} Hz", shake.pitch_deg, shake.frequency_of(head))
 }
 
-fn tables(head: Option<&HeadModel>, report: &SpringReport) -> Vec<NotedTable> {
-    let noted = |table: PageTable, note: &str| NotedTable { table, note: note.to_owned() };
-    let mut tables = Vec::new();
-    if !report.modes.is_empty() {
-        let note = "Undamped frequency. The shape is the displacement of the centre of mass (m) and the rotation (rad) in the \
-                    axes of the base; its largest entry is 1. In the picture, modes of the same kind within 1 % in frequency \
-                    are turned to the axes.";
-        tables.push(noted(mode_table(report, |mode| &mode.name), note));
-    }
+fn add_stiffness(document: &mut Document, head: Option<&HeadModel>, report: &SpringReport) {
     if let (Some(stiffness), Some(head)) = (&report.stiffness, head) {
         let [x, y, z] = centre_mm(head);
-        let note = format!(
+        document.heading("Stiffness of the head at rest");
+        document.add(stiffness_table(stiffness));
+        document.add_detail(format!(
             "Reference point: the centre of mass of the head, at rest at {x:.1}, {y:.1}, {z:.1} mm in the base. Axes of the \
              base. Force (N) and moment (N m) in a row by displacement (m) and rotation (rad) in a column. Gravity included."
-        );
-        tables.push(noted(stiffness_table("Stiffness of the head at rest", stiffness), &note));
+        ));
     }
     if let Some(at_top) = report.coil.as_ref().and_then(|coil| coil.stiffness_at_top.as_ref()) {
-        let note = "Reference point: the top of the spring on its axis, guided under the load, with the foot clamped. Axes of \
-                    the spring, z from foot to top; the wire begins on x, or at `start_deg` from it. Gravity not included.";
-        tables.push(noted(stiffness_table("Stiffness of the spring under its load", at_top), note));
+        document.heading("Stiffness of the spring under its load");
+        document.add_detail(stiffness_table(at_top));
+        document.add_detail(
+            "Reference point: the top of the spring on its axis, guided under the load, with the foot clamped. Axes of the \
+             spring, z from foot to top; the wire begins on x, or at `start_deg` from it. Gravity not included.",
+        );
     }
-    tables
 }
 
 /// The centre of mass at rest in the base, mm, without negative zeros.

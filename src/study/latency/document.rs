@@ -1,29 +1,38 @@
-//! Tables of a latency study.
+//! A latency study as a document and as CSV.
 
 use super::{LatencyResult, LatencyRun};
 use crate::bootstrap::ConfidenceInterval;
-use std::fmt::Write;
+use zsim_report::{Document, Table};
 use zsim_run::timing::{ClockState, Disturbance};
 
-/// CSV with one row per run: `latency_ms,noise_ms,clock_state` and the measures with their confidence limits.
+/// The content of `latency.csv`: a row per run, measures with their confidence limits.
 pub fn csv(study: &LatencyResult) -> String {
-    let mut text = "latency_ms,noise_ms,clock_state,cloud_sigma_m,cloud_sigma_low_m,cloud_sigma_high_m,cloud_bias_m,\
-        position_rmse_m,position_rmse_low_m,position_rmse_high_m,clock_error_ms\n"
-        .to_owned();
-    for run in &study.runs {
+    let interval = |of: &ConfidenceInterval| [of.value, of.low, of.high].map(|x| x.to_string());
+    let rows = study.runs.iter().map(|run| {
         let Disturbance { latency_ms, noise_ms } = run.disturbance;
-        let clock = if run.clock == ClockState::On { "on" } else { "off" };
-        let ConfidenceInterval { value, low, high } = run.cloud_sigma_m;
-        // Writing to a string does not fail.
-        let _ = write!(text, "{latency_ms},{noise_ms},{clock},{value},{low},{high},{}", run.cloud_bias_m);
-        let ConfidenceInterval { value, low, high } = run.position_rmse_m;
-        let _ = writeln!(text, ",{value},{low},{high},{}", run.clock_error_ms);
-    }
-    text
+        let clock = if run.clock == ClockState::On { "on" } else { "off" }.to_owned();
+        let timing = [latency_ms.to_string(), noise_ms.to_string(), clock];
+        let [bias, clock_error] = [run.cloud_bias_m, run.clock_error_ms].map(|x| vec![x.to_string()]);
+        [&timing[..], &interval(&run.cloud_sigma_m), &bias, &interval(&run.position_rmse_m), &clock_error].concat()
+    });
+    let header = [
+        "latency_ms",
+        "noise_ms",
+        "clock_state",
+        "cloud_sigma_m",
+        "cloud_sigma_low_m",
+        "cloud_sigma_high_m",
+        "cloud_bias_m",
+        "position_rmse_m",
+        "position_rmse_low_m",
+        "position_rmse_high_m",
+        "clock_error_ms",
+    ];
+    Table::new(header, rows).csv()
 }
 
-/// Table and conclusions for the terminal.
-pub fn text_table(study: &LatencyResult) -> String {
+/// Table and conclusions.
+pub fn document(study: &LatencyResult) -> Document {
     let row = |name: String, disturbance: Disturbance| {
         let run = |clock| study.run(disturbance, clock);
         let cell = |run: Option<&LatencyRun>, measure: fn(&LatencyRun) -> ConfidenceInterval| {
@@ -39,15 +48,16 @@ pub fn text_table(study: &LatencyResult) -> String {
     let latency = |run: &&LatencyRun| row(format!("{:+} ms", run.disturbance.latency_ms), run.disturbance);
     let noises = study.noises(ClockState::Off);
     let noise = |run: &&LatencyRun| row(format!("noise {} ms", run.disturbance.noise_ms), run.disturbance);
-    let rows: Vec<Vec<String>> = latencies.iter().map(latency).chain(noises.iter().skip(1).map(noise)).collect();
-    let header = ["timing", "cloud", "position", "cloud, on", "position, on", "clock ms"];
-    let words = format!(
+    let rows = latencies.iter().map(latency).chain(noises.iter().skip(1).map(noise));
+    let mut document = Document::new("Latency and timing noise", "");
+    document.add(Table::new(["timing", "cloud", "position", "cloud, on", "position, on", "clock ms"], rows));
+    document.add(format!(
         "Cloud: standard deviation about the true surfaces, mm. Position: RMSE, mm. First with the clock state off, then on; clock: \
-         error of the estimated offset at the end. Intervals: 95 %, bootstrap of blocks of {} s.\n\n{}\n",
-        study.block_s,
-        conclusions(study).join("\n")
-    );
-    format!("{}\n{}", zsim_report::table(&header, &rows, true), zsim_report::wrapped(&words, ""))
+         error of the estimated offset at the end. Intervals: 95 %, bootstrap of blocks of {} s.",
+        study.block_s
+    ));
+    document.add(conclusions(study).join("\n"));
+    document
 }
 
 /// Conclusions from the curves, one sentence each.

@@ -1,0 +1,138 @@
+//! The parts of a document that need scripts.
+
+use super::data::{ChartGroup, ShownMode, SpringView};
+use super::html::{self, escaped};
+use super::points::RunPoints;
+use super::scripts::{CHARTS, DATA, LIBRARIES, MODES, POINTS, READY, RUNS, TABLES};
+use super::stage::Stage;
+use super::{encode, table};
+use crate::Table;
+
+const SPRING: &str = include_str!("assets/spring.html");
+const MODES_CONTROLS: &str = include_str!("assets/modes.html");
+const RUNS_SECTIONS: &str = include_str!("assets/runs.html");
+/// Maximum number of runs in the table of a page; a row takes about half a kilobyte.
+pub const MAX_PAGE_RUNS: usize = 5_000;
+
+/// A part of a document that needs scripts; a document has one at most.
+pub enum Interactive {
+    /// Gains along or about each axis over frequency.
+    Gains(Vec<AxisGains>),
+    /// A head and its linkage to scale, with its modes.
+    Spring(SpringView),
+    /// The runs of a study.
+    Runs {
+        /// Settings and figures of each run.
+        runs: Table,
+        /// A note on runs that the table does not have.
+        note: String,
+        /// The same runs as points.
+        points: RunPoints,
+    },
+}
+
+/// Charts of the gains along or about one axis.
+pub struct AxisGains {
+    /// Name of the axis in `gains.csv`.
+    pub axis: &'static str,
+    /// Title.
+    pub title: String,
+    /// Groups of charts side by side.
+    pub groups: Vec<ChartGroup>,
+}
+
+impl Interactive {
+    /// Kind of the page, which the tests read.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::Gains(_) => "gains",
+            Self::Spring(_) => "spring",
+            Self::Runs { .. } => "study",
+        }
+    }
+
+    /// What works without scripts.
+    pub(super) fn without_scripts(&self) -> &'static str {
+        match self {
+            Self::Gains(_) => "The charts need scripts. The folder plots/ has them as pictures.",
+            Self::Spring(_) => "The three-dimensional view needs scripts; the tables do not.",
+            Self::Runs { .. } => "Sorting and filtering need scripts; the tables and plots do not.",
+        }
+    }
+
+    /// The scripts in the order of their dependencies.
+    pub(super) fn scripts(&self) -> &'static [&'static str] {
+        match self {
+            Self::Gains(_) => &[LIBRARIES, DATA, CHARTS, TABLES, READY],
+            Self::Spring(_) => &MODES,
+            Self::Runs { .. } => &[DATA, TABLES, RUNS, POINTS, READY],
+        }
+    }
+
+    /// The data of the scripts: JSON that is inert within a `<script>` element.
+    pub(super) fn data(&self) -> String {
+        match self {
+            Self::Gains(axes) => encode::charts_json(axes.iter().flat_map(|axis| &axis.groups)),
+            Self::Spring(view) => encode::spring_json(view),
+            Self::Runs { points, .. } => points.json(),
+        }
+    }
+
+    /// The sections.
+    pub(super) fn html(&self) -> String {
+        match self {
+            Self::Gains(axes) => axes.iter().map(AxisGains::html).collect(),
+            Self::Spring(view) => view.html(),
+            Self::Runs { runs, note, .. } => {
+                let values = [("runs", table::table(runs, "Runs")), ("runs_note", escaped(note))];
+                html::fill(RUNS_SECTIONS, &values.each_ref().map(|(name, value)| (*name, value.as_str())))
+            }
+        }
+    }
+}
+
+impl AxisGains {
+    fn html(&self) -> String {
+        let title = escaped(&self.title);
+        format!(
+            "<section data-charts=\"{}\" hidden><h2>{title}</h2><div class=\"charts\"></div></section>\n",
+            self.axis
+        )
+    }
+}
+
+impl SpringView {
+    fn html(&self) -> String {
+        let stage = Stage {
+            title: "Head and spring",
+            overlays: "<p id=\"scale\" class=\"tag\"></p>\n",
+            slider: "Phase",
+            speeds: "<option value=\"slow\" selected>2 s a cycle</option><option value=\"0.1\">real time / 10</option>\
+                     <option value=\"1\">real time</option>",
+        };
+        let mode = |(k, mode): (usize, &ShownMode)| {
+            format!(
+                "<li><label><input type=\"radio\" name=\"mode\" value=\"{k}\"> <span>{}<small>{}</small></span></label></li>\n",
+                escaped(&capitalised(&mode.name)),
+                escaped(&mode.details),
+            )
+        };
+        let modes: String = self.modes.iter().enumerate().map(mode).collect();
+        let (title, player, controls) = match self.modes.is_empty() {
+            true => ("Without load", String::new(), "<p>No modes: the head has no rest pose.</p>\n".to_owned()),
+            false => (
+                "At rest and in its modes",
+                stage.playbar(),
+                html::fill(MODES_CONTROLS, &[("modes", &modes), ("shake", &escaped(&self.shake))]),
+            ),
+        };
+        let note = escaped(&self.note);
+        let values = [("view_title", title), ("player", &player), ("controls", &controls), ("note", &note)];
+        stage.fill(SPRING, &values)
+    }
+}
+
+fn capitalised(name: &str) -> String {
+    let mut characters = name.chars();
+    characters.next().map(|first| first.to_uppercase().chain(characters).collect()).unwrap_or_default()
+}
