@@ -188,7 +188,7 @@ mod tests {
         let text = document().text();
         assert_eq!(
             text.lines().map(str::trim).filter(|line| !line.starts_with('\u{2500}')).collect::<Vec<_>>(),
-            ["Numbers", "name    mm", "x|y      1", "", "Run `a<b`."]
+            ["Numbers", "name   mm", "x|y     1", "", "Run `a<b`."]
         );
     }
 

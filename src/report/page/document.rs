@@ -124,8 +124,8 @@ mod tests {
         document.add_detail(Interactive::Runs { runs, note: hostile(), points });
         let html = document.html();
         assert_eq!(html.matches("<script>").count(), 1, "that of the page");
-        // Title twice, summary and footer; heading, paragraph, list, 2 facts; table 4, plot, link 2; runs 4 and note.
-        assert_eq!(html.matches("&lt;script&gt;").count(), 4 + 5 + 7 + 5);
+        // Title twice, summary and footer; heading, paragraph, list, 2 facts; table 4, plot, link 2; runs 3 and note.
+        assert_eq!(html.matches("&lt;script&gt;").count(), 4 + 5 + 7 + 4);
         assert_eq!(html.matches("<td class=\"text\">{{version}}</td>").count(), 2);
         assert!(html.contains("<svg></svg>"));
     }
