@@ -23,9 +23,6 @@ pub fn paper_document(
     label: Option<&str>,
 ) -> Result<Document, StudyError> {
     let mut document = Document::new(PAPER_TITLE, summary(findings, extent, label));
-    document.footer = "Bosse, Zlot and Flick, Zebedee: Design of a Spring-Mounted 3-D Range Sensor with Application to Mobile Mapping, \
-                       IEEE Transactions on Robotics 28(5), 2012."
-        .to_owned();
     for Finding { experiment, result } in findings {
         document.heading(experiment.title());
         document.add_detail(format!("`zsim reproduce {}{options}`", experiment.given));
@@ -54,6 +51,10 @@ pub fn paper_document(
     Ok(document)
 }
 
+/// The paper, as a reference.
+const PAPER: &str = "Bosse, Zlot and Flick, \"Zebedee: Design of a Spring-Mounted 3-D Range Sensor with Application to Mobile \
+                     Mapping\", IEEE Transactions on Robotics 28(5), 2012";
+
 fn summary(findings: &[Finding], extent: Extent, label: Option<&str>) -> String {
     let finished = findings.iter().filter(|finding| finding.result.is_some()).count();
     let verdicts = findings.iter().filter_map(|finding| finding.result.as_ref()).flat_map(|result| &result.rows);
@@ -64,8 +65,8 @@ fn summary(findings: &[Finding], extent: Extent, label: Option<&str>) -> String 
         Extent::Quick => " This is a smoke test with short simulations: its figures are not results.",
     };
     format!(
-        "{finished} of {} experiments are finished; {met} of {} goals are met. Written by `zsim reproduce`, zsim {}{}. Results are \
-         the median and the worst of the seeds; the worst may be twice the goal.{quick}",
+        "{PAPER}. {finished} of {} experiments are finished; {met} of {} goals are met. Written by `zsim reproduce`, zsim {}{}. \
+         Results are the median and the worst of the seeds; the worst may be twice the goal.{quick}",
         findings.len(),
         verdicts.len(),
         env!("CARGO_PKG_VERSION"),
