@@ -51,10 +51,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MAP.ply")]
     map: Option<PathBuf>,
     /// Initial position and yaw in the map, accurate to a metre and twenty degrees: metres, and degrees about the
-    /// vertical
-    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, default_value = "0,0,0,0", requires = "map",
-        allow_hyphen_values = true)]
-    start: Pose,
+    /// vertical [default: the whole map is searched]
+    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, requires = "map", allow_hyphen_values = true)]
+    start: Option<Pose>,
     /// Extend the map with this recording and write it as map.ply
     #[arg(long, requires = "map")]
     extend_map: bool,

@@ -21,10 +21,7 @@ pub enum EstimationError {
     #[error("base: {0}")]
     Base(String),
     /// Localisation in the map failed near the given start.
-    #[error(
-        "localisation in the map failed: {0}; the search covers 1 m and 20 degrees about the start; set the start with \
-         `--start x,y,z,yaw` (m, degrees)"
-    )]
+    #[error("localisation in the map failed: {0}")]
     NotInMap(String),
     /// Estimated poses that are not finite or not in order of time.
     #[error("the estimated trajectory is invalid: {0}")]

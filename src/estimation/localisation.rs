@@ -2,7 +2,7 @@
 
 use super::coasting::Coasting;
 use super::local_map::LocalMap;
-use super::map::{LocalisedPose, MAP_LIMITS, RelocalisationLimits, Relocaliser, map_covariance};
+use super::map::{LocalisedPose, NotFoundAnywhere, RelocalisationLimits, Relocaliser, map_covariance};
 use super::surfel::Patch;
 use super::window::Window;
 use super::{EstimationError, EstimatorSpec};
@@ -16,17 +16,31 @@ pub(super) struct MapLocalisation {
     relocaliser: Relocaliser,
     /// Covariance of the map error.
     covariance: Matrix6<f64>,
-    /// Approximate pose `map_from_head` of a pending search.
-    about: Option<Pose>,
+    /// A pending search.
+    pending: Option<Search>,
     /// Result of the first successful search.
     found: Option<LocalisedPose>,
 }
 
+/// Where the head is searched in the map.
+#[derive(Debug, Clone, Copy)]
+enum Search {
+    /// Near this pose, `map_from_head`.
+    Near(Pose),
+    /// In the whole map, with any heading.
+    Anywhere,
+}
+
 impl MapLocalisation {
-    /// Localisation in `map`, with a pending search near `map_from_head`.
-    pub(super) fn new(map: &SurfelMap, map_from_head: Pose, spec: &EstimatorSpec) -> Self {
+    /// Localisation in `map`, with a pending search near `map_from_head`, or in the whole map.
+    pub(super) fn new(map: &SurfelMap, map_from_head: Option<Pose>, spec: &EstimatorSpec) -> Self {
         let relocaliser = Relocaliser::new(map, &spec.matching, &spec.surfels, &spec.solve);
-        Self { relocaliser, covariance: map_covariance(map), about: Some(map_from_head), found: None }
+        Self {
+            relocaliser,
+            covariance: map_covariance(map),
+            pending: Some(map_from_head.map_or(Search::Anywhere, Search::Near)),
+            found: None,
+        }
     }
 
     /// The patches of the map.
@@ -46,7 +60,7 @@ impl MapLocalisation {
 
     /// Requests another search, near `map_from_head`.
     pub(super) fn restart_search(&mut self, map_from_head: Pose) {
-        self.about = Some(map_from_head);
+        self.pending = Some(Search::Near(map_from_head));
     }
 
     /// Performs a pending search: localises the frame of `window` in the map by the patches of the window.
@@ -57,7 +71,42 @@ impl MapLocalisation {
         window: &Window,
         head_from_imu: &Pose,
     ) -> Option<Result<LocalisedPose, EstimationError>> {
-        let about = self.about.take()?;
+        let search = self.pending.take()?;
+        let located = match search {
+            Search::Near(about) => self.find_near(&about, window, head_from_imu),
+            Search::Anywhere => self.find_anywhere(window, head_from_imu),
+        };
+        if let (None, Ok(located)) = (&self.found, &located) {
+            self.found = Some(located.clone());
+        }
+        Some(located.map_err(EstimationError::NotInMap))
+    }
+
+    /// Localises the frame of `window` anywhere in the map.
+    fn find_anywhere(&self, window: &Window, head_from_imu: &Pose) -> Result<LocalisedPose, String> {
+        let window_start = window.start_pose();
+        let here_from_head = window_start * head_from_imu.inverse();
+        let found = self.relocaliser.find_anywhere(&window.patches(), &window_start.translation.vector);
+        found.map_err(|why| match why {
+            NotFoundAnywhere::TooLarge { width_m, height_m } => format!(
+                "the map is {width_m:.0} m wide and {height_m:.0} m high, too large to be searched; pass --start"
+            ),
+            NotFoundAnywhere::TooFew { surfels } => {
+                format!("{surfels} of the finest surfels were observed, too few to search the whole map; pass --start")
+            }
+            NotFoundAnywhere::NoMatch => {
+                "nowhere in the map do enough of the observed surfels match; if the place is in the map, pass --start"
+                    .to_owned()
+            }
+            NotFoundAnywhere::Ambiguous(poses) => {
+                let [best, other] = poses.map(|pose| at_a_pose(&pose, &(pose.map_from_query * here_from_head)));
+                format!("ambiguous: {best}, and {other}; pass the right one as --start")
+            }
+        })
+    }
+
+    /// Localises the frame of `window` in the map near the pose `about`, `map_from_head`.
+    fn find_near(&self, about: &Pose, window: &Window, head_from_imu: &Pose) -> Result<LocalisedPose, String> {
         // Window and map frames are both level, so only the heading of the approximate pose is used.
         let window_start = window.start_pose();
         let here_from_head = window_start * head_from_imu.inverse();
@@ -67,26 +116,25 @@ impl MapLocalisation {
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
         let start = Pose::from_parts(shift.into(), rotation);
         let (seen, from) = (window.patches(), window_start.translation.vector);
-        let mut located = self.relocaliser.find(&seen, &from, &start, &MAP_LIMITS);
-        if let (None, Ok(found)) = (&self.found, &located)
-            && let Some(better) = self.relocaliser.find_better_elsewhere(&seen, &from, found)
-        {
-            located = Err(ambiguous(found, &better, &(better.map_from_query * here_from_head)));
+        let found = self.relocaliser.find_near(&seen, &from, &start)?;
+        let is_first = self.found.is_none();
+        match is_first.then(|| self.relocaliser.find_better_elsewhere(&seen, &from, &found)).flatten() {
+            Some(better) => Err(format!(
+                "near the start {:.0} % of the observed surface matches the map, but {}; pass that as --start",
+                100.0 * found.inlier_ratio,
+                at_a_pose(&better, &(better.map_from_query * here_from_head))
+            )),
+            None => Ok(found),
         }
-        if let (None, Ok(located)) = (&self.found, &located) {
-            self.found = Some(located.clone());
-        }
-        Some(located.map_err(EstimationError::NotInMap))
     }
 }
 
-/// Error text for a position near the given start if another start gives a `better` one.
-fn ambiguous(found: &LocalisedPose, better: &LocalisedPose, map_from_head: &Pose) -> String {
+/// How much matches at a pose, with the pose of the head as an argument of `--start`.
+fn at_a_pose(found: &LocalisedPose, map_from_head: &Pose) -> String {
     let at = map_from_head.translation.vector;
     format!(
-        "near the start {:.0} % of the observed surface matches the map, but {:.0} % at x,y,z,yaw = {:.1},{:.1},{:.1},{:.0}",
+        "{:.0} % at x,y,z,yaw = {:.1},{:.1},{:.1},{:.0}",
         100.0 * found.inlier_ratio,
-        100.0 * better.inlier_ratio,
         at.x,
         at.y,
         at.z,

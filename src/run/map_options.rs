@@ -11,8 +11,9 @@ use zsim_recording::read_surfel_map;
 pub struct MapOptions {
     /// The map.
     pub map: SurfelMap,
-    /// Approximate initial pose of the head in the map: within 1 m horizontally and 20 degrees in yaw.
-    pub map_from_head: Pose,
+    /// Approximate initial pose of the head in the map, within 1 m horizontally and 20 degrees in yaw; `None` to search all of
+    /// the map.
+    pub map_from_head: Option<Pose>,
     /// Whether to extend the map with the recording and write it.
     pub extend: bool,
 }
@@ -22,7 +23,7 @@ impl MapOptions {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn read(path: &Path, map_from_head: Pose, extend: bool) -> Result<Self, RunError> {
+    pub fn read(path: &Path, map_from_head: Option<Pose>, extend: bool) -> Result<Self, RunError> {
         Ok(Self { map: read_surfel_map(path)?, map_from_head, extend })
     }
 }

@@ -95,7 +95,7 @@ pub(super) fn run_open_loop(
     let estimator = Estimator::new(options.estimator, options.calibration)?;
     let estimator = if options.recording_surfels { estimator.recording_surfels() } else { estimator };
     let mut estimator = match options.map {
-        Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
+        Some(prior) => estimator.in_map(&prior.map, prior.map_from_head.as_ref()),
         None => estimator,
     };
     watch.data(StageData::Start { stage: Stage::Estimating, calibration: options.calibration });

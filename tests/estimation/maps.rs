@@ -11,7 +11,7 @@ use zsim::measurement::{Calibration, Measurement};
 use zsim::random::Seed;
 use zsim::recording::{Reader, RunDescription, TopicPreference, Writer};
 use zsim::simulation::{Scenario, Simulation};
-use zsim::surfel_map::SurfelMap;
+use zsim::surfel_map::{MapSurfel, SurfelMap};
 use zsim::time::{Span, Stamp};
 use zsim::world::World;
 
@@ -47,7 +47,7 @@ impl Session {
         Self { measurements: all.filter(|m| stamp(m) >= begin).collect(), calibration, truth }
     }
 
-    fn estimate(&self, within: Option<(&SurfelMap, &Pose)>) -> Result<OpenLoop, EstimationError> {
+    fn estimate(&self, within: Option<(&SurfelMap, Option<&Pose>)>) -> Result<OpenLoop, EstimationError> {
         let mut estimator = Estimator::new(&spec(), &self.calibration)?.recording_surfels();
         if let Some((map, start)) = within {
             estimator = estimator.in_map(map, start);
@@ -154,7 +154,7 @@ fn surface_rmse_m(map: &SurfelMap, world_from_map: &Pose, world: &World) -> f64 
 fn a_second_session_is_localised_to_the_accuracy_of_the_map_without_drift() {
     let (first, second) = (&*FIRST, &SECOND.session);
     let start = displaced(&second.start_in(&first.world_from_map), Vector::new(0.5, -0.4, 0.1), 15.0);
-    let run = second.estimate(Some((&first.map, &start))).unwrap();
+    let run = second.estimate(Some((&first.map, Some(&start)))).unwrap();
     let errors = second.error_in(&run.trajectory, &first.world_from_map);
     let rmse_m = errors.position_rmse_m();
     println!("mapped to {:.2} mm, localised to {:.2} mm", 1e3 * first.rmse_m, 1e3 * rmse_m);
@@ -181,7 +181,7 @@ fn after_a_gap_the_head_is_relocalised_in_the_map() {
     let kept = second.measurements.iter().filter(|m| !silence.contains(&stamp(m))).cloned().collect();
     let gapped = Session { measurements: kept, calibration: second.calibration.clone(), truth: second.truth.clone() };
     let start = second.start_in(&first.world_from_map);
-    let run = gapped.estimate(Some((&first.map, &start))).unwrap();
+    let run = gapped.estimate(Some((&first.map, Some(&start)))).unwrap();
     assert!(run.warnings.iter().any(|w| matches!(w.kind, EventKind::Restarted { .. })), "{:?}", run.warnings);
     assert!(!run.warnings.iter().any(|w| w.kind == EventKind::LostInMap), "{:?}", run.warnings);
     let behind = run.trajectory.iter().filter(|(stamp, _)| *stamp > silence.end + Span::from_seconds(1.0));
@@ -196,11 +196,49 @@ fn after_a_gap_the_head_is_relocalised_in_the_map() {
 fn an_incorrect_start_is_an_error_without_a_trajectory() {
     let (first, second) = (&*FIRST, &SECOND.session);
     let start = displaced(&second.start_in(&first.world_from_map), Vector::new(9.0, 7.0, 0.0), 90.0);
-    match second.estimate(Some((&first.map, &start))) {
+    match second.estimate(Some((&first.map, Some(&start)))) {
         Err(error @ EstimationError::NotInMap(_)) => assert!(error.to_string().contains("--start"), "{error}"),
         Ok(_) => panic!("localised 11 m away"),
         Err(other) => panic!("{other}"),
     }
+}
+
+#[test]
+fn without_a_start_the_whole_map_is_searched() {
+    let (first, second) = (&*FIRST, &SECOND.session);
+    // A map whose axes and origin have nothing to do with those of the recording.
+    let turned = displaced(&Pose::translation(-37.0, 52.0, 4.0), Vector::zeros(), 130.0);
+    let map = moved(&first.map, &turned);
+    let run = second.estimate(Some((&map, None))).unwrap();
+    let rmse_m = second.error_in(&run.trajectory, &(first.world_from_map * turned.inverse())).position_rmse_m();
+    println!("found in the whole map, {:.2} mm", 1e3 * rmse_m);
+    assert!(rmse_m < 1.5 * first.rmse_m + 0.003, "{rmse_m} m in a map of {} m", first.rmse_m);
+}
+
+#[test]
+fn a_place_that_a_map_has_twice_is_ambiguous_without_a_start() {
+    let (first, second) = (&*FIRST, &SECOND.session);
+    let twice = merge_maps(&first.map, &first.map, &Pose::translation(45.0, 0.0, 0.0)).unwrap();
+    let Err(error @ EstimationError::NotInMap(_)) = second.estimate(Some((&twice, None))) else {
+        panic!("localised in one of two equal places");
+    };
+    let text = error.to_string();
+    assert!(text.contains("ambiguous") && text.contains("--start"), "{text}");
+}
+
+/// The map in other axes.
+fn moved(map: &SurfelMap, a_from_map: &Pose) -> SurfelMap {
+    let turn = a_from_map.rotation.to_rotation_matrix().into_inner();
+    let surfels = map.surfels().iter().map(|surfel| {
+        let covariance = turn * surfel.covariance_in_map * turn.transpose();
+        MapSurfel {
+            centre_in_map: (a_from_map * nalgebra::Point3::from(surfel.centre_in_map)).coords,
+            normal_in_map: turn * surfel.normal_in_map,
+            covariance_in_map: (covariance + covariance.transpose()) * 0.5,
+            ..*surfel
+        }
+    });
+    SurfelMap::new(map.finest_voxel_m(), map.levels(), surfels.collect()).unwrap()
 }
 
 /// Surface errors of two maps, the worse of them, and of both merged and extended, m.
@@ -226,7 +264,7 @@ impl Surfaces {
         assert!(merged.surfels().len() < first.map.surfels().len() + second.map.surfels().len());
         // Extended: the second session adds surfels to the map of the first.
         let start = second.session.start_in(&first.world_from_map);
-        let run = second.session.estimate(Some((&first.map, &start))).unwrap();
+        let run = second.session.estimate(Some((&first.map, Some(&start)))).unwrap();
         let (open, covariances) = (&run.trajectory, covariances(&run.poses));
         let seen = map_of(&run.observed, open, open, &covariances, &spec().registration).unwrap();
         let extended = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();

@@ -43,10 +43,9 @@ pub(crate) struct LiveCommand {
     #[arg(long, value_name = "MAP.ply")]
     map: Option<PathBuf>,
     /// Initial position and yaw in the map, accurate to a metre and twenty degrees: metres, and degrees about the
-    /// vertical
-    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = arguments::start, default_value = "0,0,0,0", requires = "map",
-        allow_hyphen_values = true)]
-    start: Pose,
+    /// vertical [default: the whole map is searched]
+    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = arguments::start, requires = "map", allow_hyphen_values = true)]
+    start: Option<Pose>,
     /// End after this time [default: with Ctrl-C]
     #[arg(long, value_name = "TIME", value_parser = quantity::seconds, allow_hyphen_values = true)]
     duration: Option<f64>,

@@ -80,7 +80,7 @@ impl Setup {
     fn estimator(&self) -> Result<Estimator, EstimationError> {
         let estimator = Estimator::new(&self.spec, &self.calibration)?;
         Ok(match &self.map {
-            Some(prior) => estimator.in_map(&prior.map, &prior.map_from_head),
+            Some(prior) => estimator.in_map(&prior.map, prior.map_from_head.as_ref()),
             None => estimator,
         })
     }

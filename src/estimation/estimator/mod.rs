@@ -91,9 +91,9 @@ impl Estimator {
     /// Estimates the trajectory in the frame of `map`.
     ///
     /// Every window is matched with the map. The head must start near `map_from_head`: within 1 m horizontally and 20
-    /// degrees of heading. The first pose is available when the first full window is localised.
-    pub fn in_map(self, map: &SurfelMap, map_from_head: &Pose) -> Self {
-        Self { map_localisation: Some(MapLocalisation::new(map, *map_from_head, &self.spec)), ..self }
+    /// degrees of heading; without it the whole map is searched. The first pose is available when the first full window is localised.
+    pub fn in_map(self, map: &SurfelMap, map_from_head: Option<&Pose>) -> Self {
+        Self { map_localisation: Some(MapLocalisation::new(map, map_from_head.copied(), &self.spec)), ..self }
     }
 
     /// Adds a measurement, and processes each segment that is complete.

@@ -1,4 +1,4 @@
-//! Global check of a relocalisation: searches the map for a pose that matches better than the accepted one.
+//! Search of the map for a pose: for one that matches better than the accepted one, or without any knowledge of it.
 //!
 //! Rooms are symmetric and storeys look alike, so a wrong start can lead to a false pose at which most surfels match the
 //! map: up to 82 % in the mocap room rotated by 180 degrees, against 99 % at the correct pose. If the map covers little of
@@ -7,20 +7,23 @@
 
 use super::limits::{MAP_LIMITS, RelocalisationLimits};
 use super::localised_pose::{LocalisedPose, offset_pose, pose_distance};
-use super::relocaliser::{Relocaliser, is_different_pose};
+use super::relocaliser::{MIN_PATCHES, Relocaliser, is_different_pose};
 use crate::surfel::Patch;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::f64::consts::{FRAC_PI_4, TAU};
-use zsim_base::geometry::{Pose, Vector};
+use zsim_base::geometry::{Pose, Rotation, Vector};
 
 /// Edge of the grid cells, m: the correlation tolerates about one cell of error.
 const CELL_M: f64 = 0.5;
-/// Map patches within this horizontal and vertical distance of the accepted pose enter the grid, m: the search radius plus the
-/// range of the lidar indoors.
-const GRID_REACH_M: (f64, f64) = (50.0, 12.0);
-/// Horizontal and vertical search radius around the accepted pose, m: bounds the computing time.
-const SEARCH_REACH_M: (f64, f64) = (25.0, 8.0);
+/// The region about an accepted pose: the grid has the search radius plus the range of the lidar indoors, and the radius bounds
+/// the computing time.
+const ABOUT_A_POSE: Region = Region { grid_m: (50.0, 12.0), search_m: (25.0, 8.0) };
+/// Maximum number of cells that the search of a whole map may test, for each heading: a site of 400 m by 400 m, 6 m high.
+const MAX_SEARCHED_CELLS: usize = 4_000_000;
+/// A pose in a whole map is ambiguous if a different one has more than this multiple of its inlier ratio; the best false poses
+/// have at most 0.88 times that of the correct one.
+const MAX_RIVAL_INLIER_RATIO: f64 = 0.92;
 /// Step of the search in cells, horizontally and vertically.
 const STEPS: (i32, i32) = (1, 2);
 /// Heading steps per full circle (4.5 degrees each).
@@ -56,6 +59,26 @@ impl GridPose {
     }
 }
 
+/// The region of a search about a point, horizontal and vertical distances, m.
+#[derive(Debug, Clone, Copy)]
+struct Region {
+    /// Patches of the map within this distance are in the grid.
+    grid_m: (f64, f64),
+    /// Poses are searched within this distance.
+    search_m: (f64, f64),
+}
+
+impl Region {
+    /// The region of all patches of a map, and its centre; `None` without patches.
+    fn of_map(map: &[Patch]) -> Option<(Self, Vector)> {
+        let corner = |pick: fn(f64, f64) -> f64| map.iter().map(|p| p.centre).reduce(|a, b| a.zip_map(&b, pick));
+        let (low, high) = (corner(f64::min)?, corner(f64::max)?);
+        let half = (high - low) * 0.5;
+        let (level_m, up_m) = (half.xy().norm() + CELL_M, half.z + CELL_M);
+        Some((Self { grid_m: (level_m, up_m), search_m: (half.x.max(half.y), half.z) }, low + half))
+    }
+}
+
 /// Occupancy grid of normal directions around a pose: for each cell a bit per direction present in the cell or its neighbours.
 struct NormalGrid {
     first: [i32; 3],
@@ -64,11 +87,11 @@ struct NormalGrid {
 }
 
 impl NormalGrid {
-    /// Grid of the finest `patches` around `centre`; `None` if there are none.
-    fn around(centre: &Vector, patches: &[Patch]) -> Option<Self> {
+    /// Grid of the finest `patches` of the region around `centre`; `None` if there are none.
+    fn around(centre: &Vector, patches: &[Patch], region: Region) -> Option<Self> {
         let is_near = |patch: &&Patch| {
             let offset = patch.centre - centre;
-            patch.level == 0 && offset.xy().norm() < GRID_REACH_M.0 && offset.z.abs() < GRID_REACH_M.1
+            patch.level == 0 && offset.xy().norm() < region.grid_m.0 && offset.z.abs() < region.grid_m.1
         };
         let occupied: Vec<([i32; 3], u16)> = patches
             .iter()
@@ -132,6 +155,19 @@ fn directions(normal: &Vector) -> (u16, u16) {
     (bit(nearest), bit(next))
 }
 
+/// Why a whole map has no pose of a query.
+#[derive(Debug)]
+pub(crate) enum NotFoundAnywhere {
+    /// The map is too large to be searched.
+    TooLarge { width_m: f64, height_m: f64 },
+    /// The query has too few of the finest surfels.
+    TooFew { surfels: usize },
+    /// At no pose enough surfels match.
+    NoMatch,
+    /// Two different poses match about as well.
+    Ambiguous(Box<[LocalisedPose; 2]>),
+}
+
 impl Relocaliser {
     /// Returns a pose of `query`, observed from the point `from`, that matches clearly better than `found`.
     pub(crate) fn find_better_elsewhere(
@@ -181,31 +217,71 @@ impl Relocaliser {
         limits: &RelocalisationLimits,
     ) -> Option<LocalisedPose> {
         let here = found.map_from_query;
+        let is_rival = |other: &LocalisedPose| {
+            let (distance_m, _) = pose_distance(&other.map_from_query, &here, from);
+            distance_m < limits.rival_reach_m && is_different_pose(other, found, from)
+        };
+        let found = self.find_all(query, from, &here, ABOUT_A_POSE, limits);
+        let others = found.into_iter().filter(is_rival);
+        others.max_by(|a, b| limits.likelihood(a).total_cmp(&limits.likelihood(b)))
+    }
+
+    /// Returns the accepted poses of `query` in a region about the pose `here`, with any heading.
+    fn find_all(
+        &self,
+        query: &[Patch],
+        from: &Vector,
+        here: &Pose,
+        region: Region,
+        limits: &RelocalisationLimits,
+    ) -> Vec<LocalisedPose> {
         let patches_by_level = self.patches_by_level(query);
-        let candidates_here = candidates(self.patches(), &patches_by_level[0], from, &here);
+        let candidates_here = candidates(self.patches(), &patches_by_level[0], from, here, region);
         let starts = candidates_here.iter().map(|by| {
             let shift = Vector::from(by.cells.map(|cells| f64::from(cells) * CELL_M));
-            let start = offset_pose(&here, from, f64::from(by.heading_step) * TAU / HEADINGS as f64, shift);
+            let start = offset_pose(here, from, f64::from(by.heading_step) * TAU / HEADINGS as f64, shift);
             (start, start)
         });
         let poses = self.refine_all(&patches_by_level, starts.collect(), from);
         let levels = limits.levels.min(patches_by_level.len());
         let evaluated = self.evaluate_all(&patches_by_level[..levels], from, &poses, limits.gate_m);
-        let is_rival = |other: &LocalisedPose| {
-            let (distance_m, _) = pose_distance(&other.map_from_query, &here, from);
-            distance_m < limits.rival_reach_m && is_different_pose(other, found, from) && limits.accepts(other)
+        evaluated.filter(|found| limits.accepts(found)).collect()
+    }
+
+    /// Finds the pose of `query`, observed from the point `from`, in the whole map.
+    ///
+    /// # Errors
+    /// If the map is too large, no pose is accepted, or another one matches about as well.
+    pub(crate) fn find_anywhere(&self, query: &[Patch], from: &Vector) -> Result<LocalisedPose, NotFoundAnywhere> {
+        let surfels = query.iter().filter(|patch| patch.level == 0).count();
+        if surfels < MIN_PATCHES {
+            return Err(NotFoundAnywhere::TooFew { surfels });
+        }
+        let Some((region, centre)) = Region::of_map(self.patches()) else { return Err(NotFoundAnywhere::NoMatch) };
+        let (level_m, up_m) = region.search_m;
+        if (2.0 * level_m / CELL_M).powi(2) * (2.0 * up_m / CELL_M) / f64::from(STEPS.1) > MAX_SEARCHED_CELLS as f64 {
+            return Err(NotFoundAnywhere::TooLarge { width_m: 2.0 * level_m, height_m: 2.0 * up_m });
+        }
+        let here = Pose::from_parts((centre - from).into(), Rotation::identity());
+        let mut found = self.find_all(query, from, &here, region, &MAP_LIMITS);
+        found.sort_by(|a, b| b.inlier_ratio.total_cmp(&a.inlier_ratio));
+        let Some(best) = found.first() else { return Err(NotFoundAnywhere::NoMatch) };
+        let is_rival = |other: &&LocalisedPose| {
+            is_different_pose(best, other, from) && other.inlier_ratio > MAX_RIVAL_INLIER_RATIO * best.inlier_ratio
         };
-        let others = evaluated.filter(is_rival);
-        others.max_by(|a, b| limits.likelihood(a).total_cmp(&limits.likelihood(b)))
+        match found.iter().find(is_rival) {
+            Some(other) => Err(NotFoundAnywhere::Ambiguous(Box::new([best.clone(), other.clone()]))),
+            None => Ok(best.clone()),
+        }
     }
 }
 
 /// Candidate poses of the query by correlation with the map, relative to the pose `here`.
-fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose) -> Vec<GridPose> {
+fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose, region: Region) -> Vec<GridPose> {
     let centre = here.transform_point(&(*from).into()).coords;
-    let Some(grid) = NormalGrid::around(&centre, map) else { return Vec::new() };
+    let Some(grid) = NormalGrid::around(&centre, map, region) else { return Vec::new() };
     let correlated: Vec<&Patch> = query.iter().step_by(query.len().div_ceil(MAX_CORRELATED).max(1)).collect();
-    let (horizontal, up) = ((SEARCH_REACH_M.0 / CELL_M) as i32, (SEARCH_REACH_M.1 / CELL_M) as i32);
+    let (horizontal, up) = ((region.search_m.0 / CELL_M) as i32, (region.search_m.1 / CELL_M) as i32);
     let steps = |reach: i32, step: i32| (-reach / step..=reach / step).map(move |k| k * step);
     let level = || steps(horizontal, STEPS.0).flat_map(move |x| steps(horizontal, STEPS.0).map(move |y| (x, y)));
     let at = cell(&centre);

@@ -6,7 +6,8 @@ mod limits;
 mod localised_pose;
 mod relocaliser;
 
-pub(super) use limits::{MAP_LIMITS, RelocalisationLimits};
+pub(super) use global_check::NotFoundAnywhere;
+pub(super) use limits::RelocalisationLimits;
 pub use localised_pose::LocalisedPose;
 pub(super) use relocaliser::Relocaliser;
 
@@ -64,7 +65,7 @@ pub fn locate_map(
     let surfels = spec.registration.surfels(&spec.surfels);
     let relocaliser = Relocaliser::new(map, &spec.matching, &surfels, &spec.solve);
     let query: Vec<Patch> = other.surfels().iter().map(Patch::from_map_surfel).collect();
-    relocaliser.find(&query, &Vector::zeros(), start, &MAP_LIMITS).map_err(EstimationError::NotInMap)
+    relocaliser.find_near(&query, &Vector::zeros(), start).map_err(EstimationError::NotInMap)
 }
 
 /// Merges two maps in the frame of the first.

@@ -5,7 +5,7 @@
 //! coarsest resolution to the finest. The result is the pose with the highest fraction of matched surfels, provided that no
 //! different pose is nearly as good.
 
-use super::limits::RelocalisationLimits;
+use super::limits::{MAP_LIMITS, RelocalisationLimits};
 use super::localised_pose::{LocalisedPose, apply_step, pose_distance};
 use crate::matching::{Matcher, SearchTrees};
 use crate::residual::matched::MIN_SIGNIFICANT_TILT;
@@ -38,7 +38,7 @@ const MAX_UNOBSERVABLE: f64 = 1.5;
 /// Information that fixes the pose along unobservable directions, 1/m^2: larger than that of all matches.
 const FIXED_INFORMATION: f64 = 1e12;
 /// Minimum number of finest query patches for a relocalisation.
-const MIN_PATCHES: usize = 50;
+pub(super) const MIN_PATCHES: usize = 50;
 /// Poses that converged to within this distance, m and rad, are duplicates.
 const DUPLICATE_POSE_TOLERANCE: f64 = 0.01;
 /// Two poses are different above this distance, m, or angle, rad.
@@ -115,6 +115,19 @@ impl Relocaliser {
     /// The map's patches.
     pub(crate) fn patches(&self) -> &[Patch] {
         &self.patches
+    }
+
+    /// Finds the pose of `query`, observed from the point `from`, in a complete map, within 1 m and 20 degrees of `start`.
+    ///
+    /// # Errors
+    /// The reason why no pose is accepted, and what to do.
+    pub(crate) fn find_near(&self, query: &[Patch], from: &Vector, start: &Pose) -> Result<LocalisedPose, String> {
+        self.find(query, from, start, &MAP_LIMITS).map_err(|why| {
+            format!(
+                "{why}; the search covers 1 m and 20 degrees about the start; set the start with `--start x,y,z,yaw` (m, \
+                 degrees)"
+            )
+        })
     }
 
     /// Finds the pose of `query`, observed from the point `from`, near `map_from_query`.
