@@ -18,9 +18,15 @@ pub(super) struct MapLocalisation {
     covariance: Matrix6<f64>,
     /// A pending search.
     pending: Option<Search>,
+    /// Number of searches of the whole map, and the reason why the last one failed.
+    searches: usize,
+    failure: Option<String>,
     /// Result of the first successful search.
     found: Option<LocalisedPose>,
 }
+
+/// Maximum number of windows for which the whole map is searched.
+const MAX_SEARCHES: usize = 8;
 
 /// Where the head is searched in the map.
 #[derive(Debug, Clone, Copy)]
@@ -35,12 +41,8 @@ impl MapLocalisation {
     /// Localisation in `map`, with a pending search near `map_from_head`, or in the whole map.
     pub(super) fn new(map: &SurfelMap, map_from_head: Option<Pose>, spec: &EstimatorSpec) -> Self {
         let relocaliser = Relocaliser::new(map, &spec.matching, &spec.surfels, &spec.solve);
-        Self {
-            relocaliser,
-            covariance: map_covariance(map),
-            pending: Some(map_from_head.map_or(Search::Anywhere, Search::Near)),
-            found: None,
-        }
+        let pending = Some(map_from_head.map_or(Search::Anywhere, Search::Near));
+        Self { relocaliser, covariance: map_covariance(map), pending, searches: 0, failure: None, found: None }
     }
 
     /// The patches of the map.
@@ -63,6 +65,22 @@ impl MapLocalisation {
         self.pending = Some(Search::Near(map_from_head));
     }
 
+    /// Requests another search of the whole map, for a later window, if the last search was one and there were not too many.
+    ///
+    /// What a window sees may not determine its pose: a level scan of walls has no height, and corridors look alike.
+    pub(super) fn search_again(&mut self) -> bool {
+        let may = self.found.is_none() && (1..MAX_SEARCHES).contains(&self.searches);
+        if may {
+            self.pending = Some(Search::Anywhere);
+        }
+        may
+    }
+
+    /// Why the last search of the whole map failed; `None` if there was none, or if it succeeded.
+    pub(super) fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+
     /// Performs a pending search: localises the frame of `window` in the map by the patches of the window.
     ///
     /// `None` if no search is pending. The search is no longer pending afterwards, whether it succeeds or fails.
@@ -74,8 +92,12 @@ impl MapLocalisation {
         let search = self.pending.take()?;
         let located = match search {
             Search::Near(about) => self.find_near(&about, window, head_from_imu),
-            Search::Anywhere => self.find_anywhere(window, head_from_imu),
+            Search::Anywhere => {
+                self.searches += 1;
+                self.find_anywhere(window, head_from_imu)
+            }
         };
+        self.failure = located.as_ref().err().cloned().filter(|_| self.searches > 0);
         if let (None, Ok(located)) = (&self.found, &located) {
             self.found = Some(located.clone());
         }
@@ -98,6 +120,11 @@ impl MapLocalisation {
                 "nowhere in the map do enough of the observed surfels match; if the place is in the map, pass --start"
                     .to_owned()
             }
+            NotFoundAnywhere::Undetermined(pose) => format!(
+                "{}, but the surfaces seen first do not determine the position along one direction, such as the height in a \
+                 level scan; pass the position as --start",
+                at_a_pose(&pose, &(pose.map_from_query * here_from_head))
+            ),
             NotFoundAnywhere::Ambiguous(poses) => {
                 let [best, other] = poses.map(|pose| at_a_pose(&pose, &(pose.map_from_query * here_from_head)));
                 format!("ambiguous: {best}, and {other}; pass the right one as --start")

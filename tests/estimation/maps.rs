@@ -216,6 +216,17 @@ fn without_a_start_the_whole_map_is_searched() {
 }
 
 #[test]
+fn a_level_scan_at_rest_that_has_no_height_in_the_map_is_followed_by_another_search() {
+    let (first, again) = (&*FIRST, Session::record(303, (0.0, 20.0)));
+    let run = again.estimate(Some((&first.map, None))).unwrap();
+    let rmse_m = again.error_in(&run.trajectory, &first.world_from_map).position_rmse_m();
+    let later_s = run.trajectory.span().unwrap().0.seconds_since(again.truth.span().unwrap().0);
+    println!("found after {later_s:.1} s, {:.2} mm", 1e3 * rmse_m);
+    assert!(rmse_m < 1.5 * first.rmse_m + 0.003, "{rmse_m} m in a map of {} m", first.rmse_m);
+    assert!((1.0..12.0).contains(&later_s), "the trajectory begins after {later_s} s");
+}
+
+#[test]
 fn a_place_that_a_map_has_twice_is_ambiguous_without_a_start() {
     let (first, second) = (&*FIRST, &SECOND.session);
     let twice = merge_maps(&first.map, &first.map, &Pose::translation(45.0, 0.0, 0.0)).unwrap();

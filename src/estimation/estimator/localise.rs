@@ -3,6 +3,7 @@
 use super::Estimator;
 use super::phase::{GapRecovery, Tracking};
 use crate::consider::ConsiderCovariance;
+use crate::localisation::MapLocalisation;
 use crate::views::Views;
 use crate::window::Window;
 use crate::{EstimationError, EventKind};
@@ -16,12 +17,20 @@ impl Estimator {
         if let Some(recovery) = &tracking.recovery {
             tracking.window.align_gravity_with(&recovery.before);
         }
-        self.localise(tracking)
+        self.localise(tracking, true)
     }
 
     /// Performs the pending searches; returns whether one of them succeeded.
-    fn localise(&mut self, tracking: &mut Tracking) -> Result<bool, EstimationError> {
-        let in_map = self.localise_in_map(&mut tracking.window)?;
+    ///
+    /// If `may_search_again`, the window is rejected instead of an error if a later one may be found in the whole map.
+    fn localise(&mut self, tracking: &mut Tracking, may_search_again: bool) -> Result<bool, EstimationError> {
+        let in_map = match self.localise_in_map(&mut tracking.window) {
+            Err(_) if may_search_again && self.map_localisation.as_mut().is_some_and(MapLocalisation::search_again) => {
+                tracking.is_rejected = true;
+                return Ok(false);
+            }
+            in_map => in_map?,
+        };
         Ok(self.relocalise(tracking) || in_map)
     }
 
@@ -33,7 +42,7 @@ impl Estimator {
         &mut self,
         tracking: &mut Tracking,
     ) -> Result<Option<Box<GapRecovery>>, EstimationError> {
-        self.localise(tracking)?;
+        self.localise(tracking, false)?;
         let unplaced = tracking.recovery.take().filter(|recovery| recovery.relocalisation.is_some());
         if unplaced.is_some() {
             let (start_s, end_s) = (tracking.window.start_s(), tracking.window.nominal.end_s());

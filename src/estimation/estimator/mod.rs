@@ -138,7 +138,12 @@ impl Estimator {
         }
         let mut phase = std::mem::take(&mut self.phase);
         self.start_if_ready(&mut phase, true);
-        let Phase::Tracking(mut tracking) = phase else { return Err(self.missing_data_error()) };
+        let Phase::Tracking(mut tracking) = phase else {
+            let failure = self.map_localisation.as_ref().and_then(MapLocalisation::failure);
+            return Err(
+                failure.map_or_else(|| self.missing_data_error(), |why| EstimationError::NotInMap(why.to_owned()))
+            );
+        };
         let unplaced = self.localise_at_end(&mut tracking)?;
         self.intake.close();
         self.diagnostics.warnings.extend(self.intake.take_warnings());

@@ -79,6 +79,10 @@ impl Region {
     }
 }
 
+/// Maximum standard deviation of the position of a pose in a whole map, m: along an unobserved direction, such as the vertical
+/// of a level scan of walls, a pose stays where the grid of candidates put it.
+const MAX_POSITION_SIGMA_M: f64 = 0.05;
+
 /// Occupancy grid of normal directions around a pose: for each cell a bit per direction present in the cell or its neighbours.
 struct NormalGrid {
     first: [i32; 3],
@@ -164,6 +168,8 @@ pub(crate) enum NotFoundAnywhere {
     TooFew { surfels: usize },
     /// At no pose enough surfels match.
     NoMatch,
+    /// The matches do not determine the position along a direction: this pose is right but for it.
+    Undetermined(Box<LocalisedPose>),
     /// Two different poses match about as well.
     Ambiguous(Box<[LocalisedPose; 2]>),
 }
@@ -271,6 +277,9 @@ impl Relocaliser {
         };
         match found.iter().find(is_rival) {
             Some(other) => Err(NotFoundAnywhere::Ambiguous(Box::new([best.clone(), other.clone()]))),
+            None if best.position_sigma_m() > MAX_POSITION_SIGMA_M => {
+                Err(NotFoundAnywhere::Undetermined(Box::new(best.clone())))
+            }
             None => Ok(best.clone()),
         }
     }

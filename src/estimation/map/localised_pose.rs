@@ -26,6 +26,11 @@ pub struct LocalisedPose {
 const LIKELY_SCORE: f64 = 0.1;
 
 impl LocalisedPose {
+    /// The largest standard deviation of the position over all directions, m.
+    pub(super) fn position_sigma_m(&self) -> f64 {
+        self.covariance.fixed_view::<3, 3>(3, 3).into_owned().symmetric_eigenvalues().max().max(0.0).sqrt()
+    }
+
     /// Adds to the covariance the spread of poses that match too, weighted by their scores, and records the largest
     /// distance of those with at least [`LIKELY_SCORE`] of the best score.
     pub(super) fn with_alternatives(&self, scored: &[&(f64, LocalisedPose)], from: &Vector) -> Self {
