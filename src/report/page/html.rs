@@ -6,7 +6,7 @@ const SHELL: &str = include_str!("assets/page.html");
 const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));
 
 /// Escapes text for elements and attributes.
-pub(super) fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let escape = |c: char| match c {
         '&' => "&amp;".to_owned(),
         '<' => "&lt;".to_owned(),
@@ -20,7 +20,7 @@ pub(super) fn escaped(text: &str) -> String {
 }
 
 /// Replaces each `{{name}}` of the template by its value, in one pass: values are not searched for names.
-pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
+pub(crate) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut parts = template.split("{{");
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
@@ -33,10 +33,10 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
 }
 
 /// Kind of the page of a run that is not complete, the only one that may connect to its server.
-pub(super) const LIVE: &str = "live";
+pub(crate) const LIVE: &str = "live";
 
 /// Everything that differs between pages; the shell is the same.
-pub(super) struct Page<'a> {
+pub(crate) struct Page<'a> {
     /// Kind of the page, which the scripts read.
     pub kind: &'a str,
     /// Title, as text.
@@ -83,7 +83,7 @@ impl Page<'_> {
 }
 
 /// Escapes text with code between backticks, as in Markdown.
-pub(super) fn with_code(text: &str) -> String {
+pub(crate) fn with_code(text: &str) -> String {
     let parts: Vec<&str> = text.split('`').collect();
     if parts.len().is_multiple_of(2) {
         return escaped(text);
@@ -96,7 +96,7 @@ pub(super) fn with_code(text: &str) -> String {
 }
 
 /// The verdict: icon, status and reason.
-pub(super) fn verdict(metrics: &Metrics) -> String {
+pub(crate) fn verdict(metrics: &Metrics) -> String {
     let (Some(verdict), Some(status)) = (verdict::verdict(metrics), metrics.status.as_deref()) else {
         return String::new();
     };
@@ -104,12 +104,12 @@ pub(super) fn verdict(metrics: &Metrics) -> String {
 }
 
 /// The verdict without its status.
-pub(super) fn reason<'a>(verdict: &'a str, status: &str) -> &'a str {
+pub(crate) fn reason<'a>(verdict: &'a str, status: &str) -> &'a str {
     verdict.strip_prefix(status).map_or(verdict, |rest| rest.trim_start_matches(": "))
 }
 
 /// A status with its icon and a reason.
-pub(super) fn verdict_line(status: &str, reason: &str) -> String {
+pub(crate) fn verdict_line(status: &str, reason: &str) -> String {
     let (class, icon) = match status {
         "good" => ("good", "<path d=\"M5 12.5l4.5 4.5L19 7.5\"/>"),
         "degraded" => ("degraded", "<path d=\"M12 4v10M12 18.5v.5\"/>"),
@@ -124,7 +124,7 @@ pub(super) fn verdict_line(status: &str, reason: &str) -> String {
 }
 
 /// Causes of the status, losses and notes.
-pub(super) fn events(metrics: &Metrics) -> String {
+pub(crate) fn events(metrics: &Metrics) -> String {
     let cause = |cause: &CauseMetrics| {
         format!("{}, {:.1} to {:.1} s: {}", cause.status, cause.from_s, cause.to_s, cause.sentence)
     };

@@ -43,7 +43,7 @@ pub struct AxisGains {
 
 impl Interactive {
     /// Kind of the page, which the tests read.
-    pub(super) fn kind(&self) -> &'static str {
+    pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Gains(_) => "gains",
             Self::Spring(_) => "spring",
@@ -52,7 +52,7 @@ impl Interactive {
     }
 
     /// What works without scripts.
-    pub(super) fn without_scripts(&self) -> &'static str {
+    pub(crate) fn without_scripts(&self) -> &'static str {
         match self {
             Self::Gains(_) => "The charts need scripts. The folder plots/ has them as pictures.",
             Self::Spring(_) => "The three-dimensional view needs scripts; the tables do not.",
@@ -61,7 +61,7 @@ impl Interactive {
     }
 
     /// The scripts in the order of their dependencies.
-    pub(super) fn scripts(&self) -> &'static [&'static str] {
+    pub(crate) fn scripts(&self) -> &'static [&'static str] {
         match self {
             Self::Gains(_) => &[LIBRARIES, DATA, CHARTS, TABLES, READY],
             Self::Spring(_) => &MODES,
@@ -70,7 +70,7 @@ impl Interactive {
     }
 
     /// The data of the scripts: JSON that is inert within a `<script>` element.
-    pub(super) fn data(&self) -> String {
+    pub(crate) fn data(&self) -> String {
         match self {
             Self::Gains(axes) => encode::charts_json(axes.iter().flat_map(|axis| &axis.groups)),
             Self::Spring(view) => encode::spring_json(view),
@@ -79,7 +79,7 @@ impl Interactive {
     }
 
     /// The sections.
-    pub(super) fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         match self {
             Self::Gains(axes) => axes.iter().map(AxisGains::html).collect(),
             Self::Spring(view) => view.html(),

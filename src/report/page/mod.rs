@@ -6,19 +6,18 @@
 
 mod binary;
 mod data;
-mod document;
 mod encode;
-mod html;
-mod interactive;
+pub(crate) mod html;
+pub(crate) mod interactive;
 pub mod links;
 mod live;
 mod points;
 mod quantise;
 mod scene;
-mod scripts;
+pub(crate) mod scripts;
 mod stage;
 mod surfaces;
-mod table;
+pub(crate) mod table;
 mod update;
 
 use crate::rows;

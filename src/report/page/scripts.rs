@@ -1,18 +1,18 @@
 //! The scripts of the pages.
 
-pub(super) const LIBRARIES: &str = include_str!("assets/vendor/vendor.min.js");
-pub(super) const DATA: &str = include_str!("assets/data.js");
-pub(super) const CHARTS: &str = include_str!("assets/charts.js");
-pub(super) const TABLES: &str = include_str!("assets/table.js");
-pub(super) const RUNS: &str = include_str!("assets/runs.js");
-pub(super) const POINTS: &str = include_str!("assets/points.js");
-pub(super) const READY: &str = include_str!("assets/ready.js");
+pub(crate) const LIBRARIES: &str = include_str!("assets/vendor/vendor.min.js");
+pub(crate) const DATA: &str = include_str!("assets/data.js");
+pub(crate) const CHARTS: &str = include_str!("assets/charts.js");
+pub(crate) const TABLES: &str = include_str!("assets/table.js");
+pub(crate) const RUNS: &str = include_str!("assets/runs.js");
+pub(crate) const POINTS: &str = include_str!("assets/points.js");
+pub(crate) const READY: &str = include_str!("assets/ready.js");
 const STAGE: &str = include_str!("assets/stage.js");
 const PLAYBACK: &str = include_str!("assets/playback.js");
 const HEAD: &str = include_str!("assets/head.js");
 
 /// The scripts of the view of a run or a scene, in the order of their dependencies.
-pub(super) const VIEW: [&str; 13] = [
+pub(crate) const VIEW: [&str; 13] = [
     LIBRARIES,
     DATA,
     include_str!("assets/paths.js"),
@@ -29,4 +29,4 @@ pub(super) const VIEW: [&str; 13] = [
 ];
 
 /// The scripts of the page of a spring, in the order of their dependencies.
-pub(super) const MODES: [&str; 6] = [LIBRARIES, DATA, STAGE, PLAYBACK, HEAD, include_str!("assets/modes.js")];
+pub(crate) const MODES: [&str; 6] = [LIBRARIES, DATA, STAGE, PLAYBACK, HEAD, include_str!("assets/modes.js")];

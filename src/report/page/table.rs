@@ -6,7 +6,7 @@ use crate::{Metrics, Table, rows};
 use zsim_estimation::PartTime;
 
 /// The table, which scrolls if it is too wide; `label` names it for screen readers.
-pub(super) fn table(table: &Table, label: &str) -> String {
+pub(crate) fn table(table: &Table, label: &str) -> String {
     if table.header.is_empty() {
         return format!("<div class=\"tables\">\n{}</div>\n", named_values("", &table.rows));
     }
@@ -35,7 +35,7 @@ pub(super) fn table(table: &Table, label: &str) -> String {
 }
 
 /// A name as HTML, as a link if it has an address.
-pub(super) fn linked(name: &str, address: Option<&str>) -> String {
+pub(crate) fn linked(name: &str, address: Option<&str>) -> String {
     match address {
         Some(address) => format!("<a href=\"{}\">{}</a>", escaped(address), escaped(name)),
         None => escaped(name),
@@ -43,7 +43,7 @@ pub(super) fn linked(name: &str, address: Option<&str>) -> String {
 }
 
 /// A table of names and values; no caption if it is empty.
-pub(super) fn named_values(caption: &str, rows: &[Vec<String>]) -> String {
+pub(crate) fn named_values(caption: &str, rows: &[Vec<String>]) -> String {
     let caption = if caption.is_empty() { String::new() } else { format!("<caption>{}</caption>\n", escaped(caption)) };
     let row = |row: &Vec<String>| match row.as_slice() {
         [name, value, ..] => {
@@ -55,7 +55,7 @@ pub(super) fn named_values(caption: &str, rows: &[Vec<String>]) -> String {
 }
 
 /// The metrics in groups, and the run time of each part of the estimator.
-pub(super) fn metrics_tables(metrics: &Metrics, parts: &[PartTime]) -> String {
+pub(crate) fn metrics_tables(metrics: &Metrics, parts: &[PartTime]) -> String {
     let mut html = String::new();
     for (title, rows) in rows::groups(metrics) {
         html += &named_values(title, &rows);

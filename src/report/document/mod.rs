@@ -1,7 +1,9 @@
 //! A result as a document, for the terminal, a page and Markdown.
 
-use super::page::Interactive;
-use super::{Table, wrapped};
+mod html;
+
+use crate::page::Interactive;
+use crate::{Table, wrapped};
 
 /// A result in its order of reading; all renderings have the same words and values.
 #[derive(Default)]
@@ -12,14 +14,14 @@ pub struct Document {
     pub summary: String,
     /// Last line of the page.
     pub footer: String,
-    pub(super) parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
     /// Heading of the next part.
     heading: Option<String>,
 }
 
 /// A part of a document.
-pub(super) struct Part {
-    pub(super) content: Content,
+pub(crate) struct Part {
+    pub(crate) content: Content,
     /// Whether the terminal omits it.
     is_detail: bool,
 }

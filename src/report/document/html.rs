@@ -1,10 +1,10 @@
 //! The page of a document.
 
-use super::html::{self, escaped};
-use super::interactive::Interactive;
-use super::scripts::{DATA, READY, TABLES};
-use super::table::{linked, table};
-use crate::document::{Content, Document, Part, Plot};
+use super::{Content, Document, Part, Plot};
+use crate::page::html::{self, escaped};
+use crate::page::interactive::Interactive;
+use crate::page::scripts::{DATA, READY, TABLES};
+use crate::page::table::{linked, table};
 
 /// A wider plot does not share its row with another, points.
 const BROAD_PLOT: f64 = 800.0;
@@ -91,9 +91,9 @@ fn width_of(svg: &str) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{PointColumn, RunPoints};
     use super::*;
     use crate::Table;
+    use crate::page::{PointColumn, RunPoints};
 
     #[test]
     fn a_broad_plot_has_its_own_row() {
