@@ -1,8 +1,11 @@
 //! The beams of a recording: one pass over them, and their projection by an estimate or by the truth.
 
 use super::RunError;
-use super::read_ahead::{MeasurementStream, read_ahead};
+use super::read_ahead::{MeasurementStream, QUEUE_CAPACITY, read_ahead};
 use super::truth_cursor::TruthCursor;
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+use std::thread;
 use zsim_base::geometry::{Pose, SmoothCursor, Trajectory, Vector};
 use zsim_base::measurement::{Calibration, ImuSample, LidarCorrection, LidarReturn, LidarScan, Measurement};
 use zsim_base::parallel::Stopped;
@@ -21,32 +24,71 @@ pub(super) trait BeamReader {
     fn scan(&mut self, scan: &LidarScan, truth: Option<&mut TruthCursor>) -> Result<(), RunError>;
 }
 
+/// A reader of beams that may have a thread of its own.
+pub(super) type Reading<'a> = &'a mut (dyn BeamReader + Send);
+
 /// Calls `readers` with all measurements of a recording, and with its truth if `with_truth`, in one pass.
 ///
-/// `on_scan` is called with the stamp of each scan.
+/// `on_scan` is called with the stamp of each scan. Each reader but the first has a thread of its own if more than one is
+/// available.
 ///
 /// # Errors
 /// If the recording cannot be read, or if a reader or `on_scan` fails.
 pub(super) fn read_beams(
     (reader, selection): (&Reader, &Selection),
     with_truth: bool,
-    readers: &mut [&mut dyn BeamReader],
+    readers: Vec<Reading>,
     on_scan: &mut dyn FnMut(Stamp) -> Result<(), Stopped>,
 ) -> Result<(), RunError> {
-    let pass = |measurements: &mut MeasurementStream| {
-        let mut truth = with_truth.then(|| TruthCursor::new(reader.truth()));
-        for measurement in measurements {
-            match measurement? {
-                Measurement::Imu(sample) => readers.iter_mut().for_each(|reader| reader.imu(&sample)),
-                Measurement::Lidar(scan) => {
-                    on_scan(scan.stamp)?;
-                    readers.iter_mut().try_for_each(|reader| reader.scan(&scan, truth.as_mut()))?;
-                }
-            }
+    let truth = || with_truth.then(|| TruthCursor::new(reader.truth()));
+    let mut here = readers;
+    let beside = if rayon::current_num_threads() < 2 { Vec::new() } else { here.split_off(here.len().min(1)) };
+    thread::scope(|scope| {
+        let (mut senders, mut threads) = (Vec::new(), Vec::new());
+        for reading in beside {
+            let (sender, receiver) = sync_channel::<Arc<Measurement>>(QUEUE_CAPACITY);
+            let read = || {
+                let (mut readings, mut truth) = ([reading], truth());
+                receiver.into_iter().try_for_each(|measurement| pass_on(&measurement, &mut readings, truth.as_mut()))
+            };
+            threads.push(scope.spawn(read));
+            senders.push(sender);
         }
-        Ok(())
-    };
-    read_ahead(reader, selection, pass).0
+        let pass = |measurements: &mut MeasurementStream| {
+            let mut truth = truth();
+            for measurement in measurements {
+                let measurement = Arc::new(measurement?);
+                if let Measurement::Lidar(scan) = &*measurement {
+                    on_scan(scan.stamp)?;
+                }
+                // A reader that has failed receives no more; its error follows.
+                senders.iter().for_each(|sender| drop(sender.send(measurement.clone())));
+                pass_on(&measurement, &mut here, truth.as_mut())?;
+            }
+            Ok(())
+        };
+        let (passed, _) = read_ahead(reader, selection, pass);
+        drop(senders);
+        let join = |thread: thread::ScopedJoinHandle<'_, _>| {
+            thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        threads.into_iter().map(join).fold(passed, Result::and)
+    })
+}
+
+/// Calls readers with a measurement.
+fn pass_on(
+    measurement: &Measurement,
+    readers: &mut [Reading],
+    mut truth: Option<&mut TruthCursor>,
+) -> Result<(), RunError> {
+    match measurement {
+        Measurement::Imu(sample) => readers.iter_mut().for_each(|reader| reader.imu(sample)),
+        Measurement::Lidar(scan) => {
+            readers.iter_mut().try_for_each(|reader| reader.scan(scan, truth.as_deref_mut()))?;
+        }
+    }
+    Ok(())
 }
 
 /// A projected beam: origin and end point.

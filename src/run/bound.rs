@@ -62,7 +62,7 @@ pub fn information_bound(
         let message = "the recording has no true trajectory, which the bound requires".to_owned();
         return Err(RunError::Plan { what: "information bound", message });
     };
-    read_beams((reader, &selection), true, &mut [&mut bound], &mut |stamp| {
+    read_beams((reader, &selection), true, vec![&mut bound], &mut |stamp| {
         watch.progress(Stage::Bounding, stamp.seconds_since(first), Some(last.seconds_since(first)));
         watch.check_stop()
     })?;

@@ -1,6 +1,6 @@
 //! Estimation from a recording, with evaluation and output files.
 
-use super::beams::{BeamReader, read_beams};
+use super::beams::{Reading, read_beams};
 use super::bound::{BoundAccumulator, RecordingBound};
 use super::calibration::calibration;
 use super::cloud::{Surroundings, cloud_metrics};
@@ -197,12 +197,12 @@ impl<'a> Estimated<'a> {
         });
         let mut cloud = registration.map(|registration| registration.start(folder)).transpose()?;
         let mut bound = bound.filter(|_| with_truth);
-        let of_cloud = cloud.iter_mut().map(|cloud| cloud as &mut dyn BeamReader);
-        let of_bound = bound.iter_mut().map(|bound| bound as &mut dyn BeamReader);
-        let mut readers: Vec<&mut dyn BeamReader> = of_cloud.chain(of_bound).collect();
+        let of_cloud = cloud.iter_mut().map(|cloud| cloud as Reading);
+        let of_bound = bound.iter_mut().map(|bound| bound as Reading);
+        let readers: Vec<Reading> = of_cloud.chain(of_bound).collect();
         let (first, last) = best.map_from_head.span().unwrap_or_default();
         if !readers.is_empty() {
-            read_beams((self.reader, self.selection), with_truth, &mut readers, &mut |stamp| {
+            read_beams((self.reader, self.selection), with_truth, readers, &mut |stamp| {
                 watch.progress(Stage::Registering, stamp.seconds_since(first), Some(last.seconds_since(first)));
                 watch.check_stop()
             })?;

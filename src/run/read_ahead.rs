@@ -6,7 +6,7 @@ use zsim_base::measurement::Measurement;
 use zsim_recording::{Loss, Reader, RecordingError, Selection};
 
 /// Capacity of the queue, measurements: about 1 s of data.
-const QUEUE_CAPACITY: usize = 256;
+pub(super) const QUEUE_CAPACITY: usize = 256;
 
 /// The measurements of a recording, in order.
 pub(super) type MeasurementStream<'a> = dyn Iterator<Item = Result<Measurement, RecordingError>> + 'a;

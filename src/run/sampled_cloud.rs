@@ -34,7 +34,7 @@ impl RunRecording {
             read: 0,
             beams: Vec::new(),
         };
-        read_beams((&self.reader, &self.selection), true, &mut [&mut sample], &mut |_| check())?;
+        read_beams((&self.reader, &self.selection), true, vec![&mut sample], &mut |_| check())?;
         Ok(sample.beams)
     }
 }

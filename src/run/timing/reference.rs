@@ -95,7 +95,7 @@ impl Reference {
             evaluated: Vec::new(),
             shown: Vec::new(),
         };
-        read_beams((reader, selection), true, &mut [&mut sampling], &mut |_| check(stop))?;
+        read_beams((reader, selection), true, vec![&mut sampling], &mut |_| check(stop))?;
         let ReturnSampler { scan_stamps, evaluated, shown, .. } = sampling;
         let coordinates: Vec<(f64, f64)> = shown.iter().map(|(_, coordinates)| *coordinates).collect();
         let range_m = densest_range(&coordinates);
