@@ -31,9 +31,6 @@ pub enum HeadError {
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// The data of a page cannot be written as JSON.
-    #[error("the data of the page cannot be written as JSON: {0}")]
-    Page(#[from] serde_json::Error),
     /// The study was stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),

@@ -42,10 +42,10 @@ pub(super) fn read_beams(
 ) -> Result<(), RunError> {
     let truth = || with_truth.then(|| TruthCursor::new(reader.truth()));
     let mut here = readers;
-    let beside = if rayon::current_num_threads() < 2 { Vec::new() } else { here.split_off(here.len().min(1)) };
+    let others = if rayon::current_num_threads() < 2 { Vec::new() } else { here.split_off(here.len().min(1)) };
     thread::scope(|scope| {
         let (mut senders, mut threads) = (Vec::new(), Vec::new());
-        for reading in beside {
+        for reading in others {
             let (sender, receiver) = sync_channel::<Arc<Measurement>>(QUEUE_CAPACITY);
             let read = || {
                 let (mut readings, mut truth) = ([reading], truth());

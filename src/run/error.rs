@@ -47,8 +47,8 @@ pub enum RunError {
     /// A plot could not be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
-    /// The metrics could not be written as JSON.
-    #[error("the metrics cannot be written as JSON: {0}")]
+    /// Figures could not be written as JSON.
+    #[error("the figures cannot be written as JSON: {0}")]
     Figures(#[from] serde_json::Error),
     /// A file or folder could not be read, created or written.
     #[error(transparent)]

@@ -9,7 +9,7 @@ use zsim_motion::MotionSpec;
 use zsim_sensors::LidarSpec;
 use zsim_simulation::Run;
 
-/// Inputs of a run: the simulation, the estimator, and what comes between or beside them.
+/// Inputs of a run: the simulation, the estimator, timing errors between them, and a second system.
 ///
 /// A study varies them by their paths in the serialised form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -18,13 +18,16 @@ use zsim_world::WorldError;
 pub enum StudyError {
     /// A run failed: its simulation, estimate or evaluation, or the writing of its files.
     #[error(transparent)]
-    Run(#[from] RunError),
+    Run(RunError),
     /// A study of a head failed.
     #[error(transparent)]
-    Head(#[from] HeadError),
+    Head(HeadError),
     /// A spec is missing or invalid.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// The study was stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// The settings of a study are inconsistent or cannot be met.
     #[error("{what}: {message}")]
     Plan {
@@ -33,15 +36,6 @@ pub enum StudyError {
         /// The problem, and what to do.
         message: String,
     },
-    /// A plot could not be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
-    /// Figures could not be written as JSON.
-    #[error("the figures cannot be written as JSON: {0}")]
-    Figures(#[from] serde_json::Error),
-    /// A file or folder could not be read, created or written.
-    #[error(transparent)]
-    File(#[from] FileError),
     /// A table is damaged.
     #[error("{}: {message}", path.display())]
     Table {
@@ -50,21 +44,12 @@ pub enum StudyError {
         /// The problem.
         message: String,
     },
-    /// A run of a sweep exceeded the time limit.
-    #[error("took longer than {time_s} s")]
-    TooLong {
-        /// Time limit, s.
-        time_s: f64,
-    },
     /// A worker process failed.
     #[error("a worker process failed: {message}")]
     Worker {
         /// Error message of the process.
         message: String,
     },
-    /// The thread pool could not be created.
-    #[error("cannot start the worker threads: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
     /// The output folder has files that do not belong to this experiment, so that it cannot be resumed there.
     #[error(
         "{} contains files of another experiment (different spec, extent or version, or unrelated files): pass another \
@@ -75,9 +60,27 @@ pub enum StudyError {
         /// The output folder.
         folder: PathBuf,
     },
-    /// The study was stopped.
-    #[error(transparent)]
-    Stopped(#[from] Stopped),
+}
+
+impl From<RunError> for StudyError {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Spec(error) => Self::Spec(error),
+            RunError::Stopped(stopped) => Self::Stopped(stopped),
+            RunError::Head(error) => error.into(),
+            error => Self::Run(error),
+        }
+    }
+}
+
+impl From<HeadError> for StudyError {
+    fn from(error: HeadError) -> Self {
+        match error {
+            HeadError::Spec(error) => Self::Spec(error),
+            HeadError::Stopped(stopped) => Self::Stopped(stopped),
+            error => Self::Head(error),
+        }
+    }
 }
 
 /// Errors of the rooms below become those of a run or of a head.
@@ -97,6 +100,10 @@ from_below! {
     RecordingError => RunError,
     EvaluationError => RunError,
     EstimationError => RunError,
+    FileError => RunError,
+    PlotError => RunError,
+    serde_json::Error => RunError,
+    rayon::ThreadPoolBuildError => RunError,
     DynamicsError => HeadError,
     MotionError => HeadError,
 }
@@ -109,7 +116,7 @@ impl StudyError {
 
     /// Whether the study was stopped on request.
     pub fn is_stopped(&self) -> bool {
-        matches!(self, Self::Stopped(_) | Self::Run(RunError::Stopped(_)) | Self::Head(HeadError::Stopped(_)))
+        matches!(self, Self::Stopped(_))
     }
 
     /// Whether the input is invalid (a spec, a setting), as opposed to a failure during the run.

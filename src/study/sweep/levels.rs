@@ -143,7 +143,7 @@ fn legend(summary: &Summary) -> String {
         );
     }
     format!(
-        "Medians; with quartiles on the page and in study.md. Ratio: median over pairs of runs that differ only in this axis, to its first level. * p < \
-         {SIGNIFICANCE_LEVEL} in a two-sided Wilcoxon signed-rank test of the log ratios, Holm-corrected over all levels."
+        "Medians; with quartiles on the page and in study.md. Ratio: median over pairs of runs that differ only in this \
+         axis, to its first level. * p < {SIGNIFICANCE_LEVEL} in a two-sided Wilcoxon signed-rank test of the log ratios, Holm-corrected over all levels."
     )
 }

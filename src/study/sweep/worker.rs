@@ -13,6 +13,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use zsim_base::files::FileError;
 use zsim_base::parallel::{OnProgress, PieceProgress, Stopped};
+use zsim_run::RunError;
 
 /// Interval at which the stop flag and the time limit are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
@@ -133,7 +134,7 @@ impl Worker<'_> {
     fn crash_reason(&self, status: ExitStatus, too_long: bool, stderr: &str) -> Result<String, StudyError> {
         let limit = self.sweep.plan.limit();
         if let (true, Some(limit)) = (too_long, limit) {
-            return Ok(StudyError::TooLong { time_s: limit.time_s }.to_string());
+            return Ok(RunError::TooLong { time_s: limit.time_s }.to_string());
         }
         let is_out_of_memory = OUT_OF_MEMORY.iter().any(|message| stderr.contains(message));
         if let (true, Some(limit)) = (is_out_of_memory, limit) {
