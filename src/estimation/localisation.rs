@@ -2,7 +2,7 @@
 
 use super::coasting::Coasting;
 use super::local_map::LocalMap;
-use super::map::{LocalisedPose, NotFoundAnywhere, RelocalisationLimits, Relocaliser, map_covariance};
+use super::map::{LocalisedPose, RelocalisationLimits, Relocaliser, map_covariance};
 use super::surfel::Patch;
 use super::window::Window;
 use super::{EstimationError, EstimatorSpec};
@@ -18,15 +18,11 @@ pub(super) struct MapLocalisation {
     covariance: Matrix6<f64>,
     /// A pending search.
     pending: Option<Search>,
-    /// Number of searches of the whole map, and the reason why the last one failed.
-    searches: usize,
+    /// Why the last search of the whole map failed.
     failure: Option<String>,
     /// Result of the first successful search.
     found: Option<LocalisedPose>,
 }
-
-/// Maximum number of windows for which the whole map is searched.
-const MAX_SEARCHES: usize = 8;
 
 /// Where the head is searched in the map.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +38,7 @@ impl MapLocalisation {
     pub(super) fn new(map: &SurfelMap, map_from_head: Option<Pose>, spec: &EstimatorSpec) -> Self {
         let relocaliser = Relocaliser::new(map, &spec.matching, &spec.surfels, &spec.solve);
         let pending = Some(map_from_head.map_or(Search::Anywhere, Search::Near));
-        Self { relocaliser, covariance: map_covariance(map), pending, searches: 0, failure: None, found: None }
+        Self { relocaliser, covariance: map_covariance(map), pending, failure: None, found: None }
     }
 
     /// The patches of the map.
@@ -65,15 +61,14 @@ impl MapLocalisation {
         self.pending = Some(Search::Near(map_from_head));
     }
 
-    /// Requests another search of the whole map, for a later window, if the last search was one and there were not too many.
+    /// Requests another search of the whole map, for a later window, if the last search was one and failed.
     ///
     /// What a window sees may not determine its pose: a level scan of walls has no height, and corridors look alike.
     pub(super) fn search_again(&mut self) -> bool {
-        let may = self.found.is_none() && (1..MAX_SEARCHES).contains(&self.searches);
-        if may {
+        if self.failure.is_some() {
             self.pending = Some(Search::Anywhere);
         }
-        may
+        self.failure.is_some()
     }
 
     /// Why the last search of the whole map failed; `None` if there was none, or if it succeeded.
@@ -90,83 +85,47 @@ impl MapLocalisation {
         head_from_imu: &Pose,
     ) -> Option<Result<LocalisedPose, EstimationError>> {
         let search = self.pending.take()?;
+        let window_start = window.start_pose();
+        let here_from_head = window_start * head_from_imu.inverse();
+        let (seen, from) = (window.patches(), window_start.translation.vector);
         let located = match search {
-            Search::Near(about) => self.find_near(&about, window, head_from_imu),
+            Search::Near(about) => self.find_near(&about, &seen, &from, &here_from_head),
             Search::Anywhere => {
-                self.searches += 1;
-                self.find_anywhere(window, head_from_imu)
+                let located = self.relocaliser.find_anywhere(&seen, &from, &here_from_head);
+                self.failure = located.as_ref().err().cloned();
+                located
             }
         };
-        self.failure = located.as_ref().err().cloned().filter(|_| self.searches > 0);
         if let (None, Ok(located)) = (&self.found, &located) {
             self.found = Some(located.clone());
         }
         Some(located.map_err(EstimationError::NotInMap))
     }
 
-    /// Localises the frame of `window` anywhere in the map.
-    fn find_anywhere(&self, window: &Window, head_from_imu: &Pose) -> Result<LocalisedPose, String> {
-        let window_start = window.start_pose();
-        let here_from_head = window_start * head_from_imu.inverse();
-        let found = self.relocaliser.find_anywhere(&window.patches(), &window_start.translation.vector);
-        found.map_err(|why| match why {
-            NotFoundAnywhere::TooLarge { width_m, height_m } => format!(
-                "the map is {width_m:.0} m wide and {height_m:.0} m high, too large to be searched; pass --start"
-            ),
-            NotFoundAnywhere::TooFew { surfels } => {
-                format!("{surfels} of the finest surfels were observed, too few to search the whole map; pass --start")
-            }
-            NotFoundAnywhere::NoMatch => {
-                "nowhere in the map do enough of the observed surfels match; if the place is in the map, pass --start"
-                    .to_owned()
-            }
-            NotFoundAnywhere::Undetermined(pose) => format!(
-                "{}, but the surfaces seen first do not determine the position along one direction, such as the height in a \
-                 level scan; pass the position as --start",
-                at_a_pose(&pose, &(pose.map_from_query * here_from_head))
-            ),
-            NotFoundAnywhere::Ambiguous(poses) => {
-                let [best, other] = poses.map(|pose| at_a_pose(&pose, &(pose.map_from_query * here_from_head)));
-                format!("ambiguous: {best}, and {other}; pass the right one as --start")
-            }
-        })
-    }
-
-    /// Localises the frame of `window` in the map near the pose `about`, `map_from_head`.
-    fn find_near(&self, about: &Pose, window: &Window, head_from_imu: &Pose) -> Result<LocalisedPose, String> {
+    /// Localises the frame of a window near the pose `about`, `map_from_head`, by the surfels `seen` from the point `from`.
+    fn find_near(
+        &self,
+        about: &Pose,
+        seen: &[Patch],
+        from: &Vector,
+        here_from_head: &Pose,
+    ) -> Result<LocalisedPose, String> {
         // Window and map frames are both level, so only the heading of the approximate pose is used.
-        let window_start = window.start_pose();
-        let here_from_head = window_start * head_from_imu.inverse();
         let yaw = |rotation: &Rotation| roll_pitch_yaw(rotation).2;
         let turn = yaw(&about.rotation) - yaw(&here_from_head.rotation);
         let rotation = Rotation::from_axis_angle(&Vector::z_axis(), turn);
         let shift = about.translation.vector - rotation * here_from_head.translation.vector;
-        let start = Pose::from_parts(shift.into(), rotation);
-        let (seen, from) = (window.patches(), window_start.translation.vector);
-        let found = self.relocaliser.find_near(&seen, &from, &start)?;
+        let found = self.relocaliser.find_near(seen, from, &Pose::from_parts(shift.into(), rotation))?;
         let is_first = self.found.is_none();
-        match is_first.then(|| self.relocaliser.find_better_elsewhere(&seen, &from, &found)).flatten() {
+        match is_first.then(|| self.relocaliser.find_better_elsewhere(seen, from, &found)).flatten() {
             Some(better) => Err(format!(
                 "near the start {:.0} % of the observed surface matches the map, but {}; pass that as --start",
                 100.0 * found.inlier_ratio,
-                at_a_pose(&better, &(better.map_from_query * here_from_head))
+                better.at_head(here_from_head)
             )),
             None => Ok(found),
         }
     }
-}
-
-/// How much matches at a pose, with the pose of the head as an argument of `--start`.
-fn at_a_pose(found: &LocalisedPose, map_from_head: &Pose) -> String {
-    let at = map_from_head.translation.vector;
-    format!(
-        "{:.0} % at x,y,z,yaw = {:.1},{:.1},{:.1},{:.0}",
-        100.0 * found.inlier_ratio,
-        at.x,
-        at.y,
-        at.z,
-        roll_pitch_yaw(&map_from_head.rotation).2.to_degrees()
-    )
 }
 
 /// Relocalisation after an IMU gap in the surfaces seen before it.

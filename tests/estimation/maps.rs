@@ -229,12 +229,15 @@ fn a_level_scan_at_rest_that_has_no_height_in_the_map_is_followed_by_another_sea
 #[test]
 fn a_place_that_a_map_has_twice_is_ambiguous_without_a_start() {
     let (first, second) = (&*FIRST, &SECOND.session);
-    let twice = merge_maps(&first.map, &first.map, &Pose::translation(45.0, 0.0, 0.0)).unwrap();
-    let Err(error @ EstimationError::NotInMap(_)) = second.estimate(Some((&twice, None))) else {
-        panic!("localised in one of two equal places");
-    };
-    let text = error.to_string();
-    assert!(text.contains("ambiguous") && text.contains("--start"), "{text}");
+    // An equal room next to it, and an equal storey above it.
+    for (x, z) in [(45.0, 0.0), (0.0, 3.3)] {
+        let twice = merge_maps(&first.map, &first.map, &Pose::translation(x, 0.0, z)).unwrap();
+        let Err(error @ EstimationError::NotInMap(_)) = second.estimate(Some((&twice, None))) else {
+            panic!("localised in one of two equal places");
+        };
+        let text = error.to_string();
+        assert!(text.contains("ambiguous") && text.contains("--start"), "{text}");
+    }
 }
 
 /// The map in other axes.

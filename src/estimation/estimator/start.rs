@@ -83,7 +83,9 @@ impl Estimator {
 
     /// Discards everything estimated so far; the next data start the estimate.
     pub(super) fn start_again(&mut self, phase: &mut Phase) {
-        self.restarts += 1;
+        // Without a place in the map there is nothing to lose.
+        let is_unplaced = self.map_localisation.as_ref().is_some_and(|map| map.found().is_none());
+        self.restarts += usize::from(!is_unplaced);
         *phase = Phase::default();
         self.intake.start_again();
         self.local_map = LocalMap::without_views(&self.spec, self.local_map.consider.clone());

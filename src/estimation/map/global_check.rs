@@ -7,7 +7,7 @@
 
 use super::limits::{MAP_LIMITS, RelocalisationLimits};
 use super::localised_pose::{LocalisedPose, offset_pose, pose_distance};
-use super::relocaliser::{MIN_PATCHES, Relocaliser, is_different_pose};
+use super::relocaliser::{COMPETING_SCORE, Relocaliser, check_size, is_different_pose};
 use crate::surfel::Patch;
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -18,22 +18,13 @@ use zsim_base::geometry::{Pose, Rotation, Vector};
 const CELL_M: f64 = 0.5;
 /// The region about an accepted pose: the grid has the search radius plus the range of the lidar indoors, and the radius bounds
 /// the computing time.
-const ABOUT_A_POSE: Region = Region { grid_m: (50.0, 12.0), search_m: (25.0, 8.0) };
+const ABOUT_A_POSE: Region = Region { grid_m: (50.0, 12.0), search_m: (25.0, 8.0), up: (2, 2), candidates: (8, 32) };
 /// Maximum number of cells that the search of a whole map may test, for each heading: a site of 400 m by 400 m, 6 m high.
 const MAX_SEARCHED_CELLS: usize = 4_000_000;
-/// A pose in a whole map is ambiguous if a different one has more than this multiple of its inlier ratio; the best false poses
-/// have at most 0.88 times that of the correct one.
-const MAX_RIVAL_INLIER_RATIO: f64 = 0.92;
-/// Step of the search in cells, horizontally and vertically.
-const STEPS: (i32, i32) = (1, 2);
 /// Heading steps per full circle (4.5 degrees each).
 const HEADINGS: usize = 80;
 /// Maximum number of query patches in the correlation.
 const MAX_CORRELATED: usize = 100;
-/// Number of candidates that are refined.
-const MAX_CANDIDATES: usize = 32;
-/// Maximum number of candidates per heading.
-const MAX_PER_HEADING: usize = 8;
 /// Candidates within this many cells and heading steps of a stronger one are suppressed.
 const SUPPRESSION: (i32, i32) = (2, 2);
 /// A surface is horizontal if the vertical component of the unit normal exceeds this (37 degrees).
@@ -52,12 +43,15 @@ struct GridPose {
 }
 
 impl GridPose {
-    fn is_near(&self, other: &Self) -> bool {
+    fn is_near(&self, other: &Self, up: i32) -> bool {
         let turns = (self.heading_step - other.heading_step).rem_euclid(HEADINGS as i32);
-        let cells_apart = (0..3).map(|axis| (self.cells[axis] - other.cells[axis]).abs()).fold(0, i32::max);
-        turns.min(HEADINGS as i32 - turns) <= SUPPRESSION.1 && cells_apart <= SUPPRESSION.0
+        let [x, y, z] = [0, 1, 2].map(|axis| (self.cells[axis] - other.cells[axis]).abs());
+        turns.min(HEADINGS as i32 - turns) <= SUPPRESSION.1 && x.max(y) <= SUPPRESSION.0 && z <= up
     }
 }
+
+/// Candidates in a whole map: the correct pose must be among those refined, or a similar one elsewhere would be taken for it.
+const IN_A_MAP: (usize, usize) = (32, 512);
 
 /// The region of a search about a point, horizontal and vertical distances, m.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +60,10 @@ struct Region {
     grid_m: (f64, f64),
     /// Poses are searched within this distance.
     search_m: (f64, f64),
+    /// Vertical step of the search, cells; and the vertical distance up to which a stronger candidate suppresses another.
+    up: (i32, i32),
+    /// Number of candidates per heading, and of those that are refined.
+    candidates: (usize, usize),
 }
 
 impl Region {
@@ -75,7 +73,10 @@ impl Region {
         let (low, high) = (corner(f64::min)?, corner(f64::max)?);
         let half = (high - low) * 0.5;
         let (level_m, up_m) = (half.xy().norm() + CELL_M, half.z + CELL_M);
-        Some((Self { grid_m: (level_m, up_m), search_m: (half.x.max(half.y), half.z) }, low + half))
+        Some((
+            Self { grid_m: (level_m, up_m), search_m: (half.x.max(half.y), half.z), up: (1, 0), candidates: IN_A_MAP },
+            low + half,
+        ))
     }
 }
 
@@ -159,21 +160,6 @@ fn directions(normal: &Vector) -> (u16, u16) {
     (bit(nearest), bit(next))
 }
 
-/// Why a whole map has no pose of a query.
-#[derive(Debug)]
-pub(crate) enum NotFoundAnywhere {
-    /// The map is too large to be searched.
-    TooLarge { width_m: f64, height_m: f64 },
-    /// The query has too few of the finest surfels.
-    TooFew { surfels: usize },
-    /// At no pose enough surfels match.
-    NoMatch,
-    /// The matches do not determine the position along a direction: this pose is right but for it.
-    Undetermined(Box<LocalisedPose>),
-    /// Two different poses match about as well.
-    Ambiguous(Box<[LocalisedPose; 2]>),
-}
-
 impl Relocaliser {
     /// Returns a pose of `query`, observed from the point `from`, that matches clearly better than `found`.
     pub(crate) fn find_better_elsewhere(
@@ -254,34 +240,51 @@ impl Relocaliser {
         evaluated.filter(|found| limits.accepts(found)).collect()
     }
 
-    /// Finds the pose of `query`, observed from the point `from`, in the whole map.
+    /// Finds the pose of `query`, observed from the point `from`, in the whole map; the pose of the head in the query's frame is
+    /// `query_from_head`.
     ///
     /// # Errors
-    /// If the map is too large, no pose is accepted, or another one matches about as well.
-    pub(crate) fn find_anywhere(&self, query: &[Patch], from: &Vector) -> Result<LocalisedPose, NotFoundAnywhere> {
-        let surfels = query.iter().filter(|patch| patch.level == 0).count();
-        if surfels < MIN_PATCHES {
-            return Err(NotFoundAnywhere::TooFew { surfels });
-        }
-        let Some((region, centre)) = Region::of_map(self.patches()) else { return Err(NotFoundAnywhere::NoMatch) };
+    /// The reason, and what to do, if the map is too large, no pose is accepted, the matches leave a direction open, or another
+    /// pose matches about as well.
+    pub(crate) fn find_anywhere(
+        &self,
+        query: &[Patch],
+        from: &Vector,
+        query_from_head: &Pose,
+    ) -> Result<LocalisedPose, String> {
+        check_size(query)?;
+        let (region, centre) = Region::of_map(self.patches()).ok_or("the map has no surfels")?;
         let (level_m, up_m) = region.search_m;
-        if (2.0 * level_m / CELL_M).powi(2) * (2.0 * up_m / CELL_M) / f64::from(STEPS.1) > MAX_SEARCHED_CELLS as f64 {
-            return Err(NotFoundAnywhere::TooLarge { width_m: 2.0 * level_m, height_m: 2.0 * up_m });
+        if (2.0 * level_m / CELL_M).powi(2) * (2.0 * up_m / CELL_M) / f64::from(region.up.0) > MAX_SEARCHED_CELLS as f64
+        {
+            let (width_m, height_m) = (2.0 * level_m, 2.0 * up_m);
+            return Err(format!(
+                "the map is {width_m:.0} m wide and {height_m:.0} m high, too large to be searched; pass --start"
+            ));
         }
         let here = Pose::from_parts((centre - from).into(), Rotation::identity());
         let mut found = self.find_all(query, from, &here, region, &MAP_LIMITS);
         found.sort_by(|a, b| b.inlier_ratio.total_cmp(&a.inlier_ratio));
-        let Some(best) = found.first() else { return Err(NotFoundAnywhere::NoMatch) };
-        let is_rival = |other: &&LocalisedPose| {
-            is_different_pose(best, other, from) && other.inlier_ratio > MAX_RIVAL_INLIER_RATIO * best.inlier_ratio
+        let Some(best) = found.first() else {
+            let why =
+                "nowhere in the map do enough of the observed surfels match; if the place is in the map, pass --start";
+            return Err(why.to_owned());
         };
-        match found.iter().find(is_rival) {
-            Some(other) => Err(NotFoundAnywhere::Ambiguous(Box::new([best.clone(), other.clone()]))),
-            None if best.position_sigma_m() > MAX_POSITION_SIGMA_M => {
-                Err(NotFoundAnywhere::Undetermined(Box::new(best.clone())))
-            }
-            None => Ok(best.clone()),
+        let competes = |other: &&LocalisedPose| {
+            is_different_pose(best, other, from) && other.inlier_ratio > COMPETING_SCORE * best.inlier_ratio
+        };
+        if let Some(other) = found.iter().find(competes) {
+            let (best, other) = (best.at_head(query_from_head), other.at_head(query_from_head));
+            return Err(format!("ambiguous: {best}, and {other}; pass the right one as --start"));
         }
+        if best.position_sigma_m() > MAX_POSITION_SIGMA_M {
+            return Err(format!(
+                "{}, but the surfaces seen do not determine the position along one direction, such as the height in a level \
+                 scan; pass the position as --start",
+                best.at_head(query_from_head)
+            ));
+        }
+        Ok(best.clone())
     }
 }
 
@@ -292,9 +295,9 @@ fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose, region
     let correlated: Vec<&Patch> = query.iter().step_by(query.len().div_ceil(MAX_CORRELATED).max(1)).collect();
     let (horizontal, up) = ((region.search_m.0 / CELL_M) as i32, (region.search_m.1 / CELL_M) as i32);
     let steps = |reach: i32, step: i32| (-reach / step..=reach / step).map(move |k| k * step);
-    let level = || steps(horizontal, STEPS.0).flat_map(move |x| steps(horizontal, STEPS.0).map(move |y| (x, y)));
+    let level = || steps(horizontal, 1).flat_map(move |x| steps(horizontal, 1).map(move |y| (x, y)));
     let at = cell(&centre);
-    let cells: Vec<[i32; 3]> = steps(up, STEPS.1)
+    let cells: Vec<[i32; 3]> = steps(up, region.up.0)
         .flat_map(|z| level().map(move |(x, y)| [x, y, z]))
         .filter(|by| grid.contains([at[0] + by[0], at[1] + by[1], at[2] + by[2]]))
         .collect();
@@ -306,14 +309,14 @@ fn candidates(map: &[Patch], query: &[Patch], from: &Vector, here: &Pose, region
         });
         let rotated: Vec<([i32; 3], u16)> = rotated.collect();
         let hits = cells.iter().map(|by| (grid.hits(&rotated, *by), GridPose { heading_step, cells: *by }));
-        suppress_non_maxima(hits.collect(), MAX_PER_HEADING)
+        suppress_non_maxima(hits.collect(), region.candidates.0, region.up.1)
     };
     let all: Vec<(usize, GridPose)> = (0..HEADINGS as i32).into_par_iter().flat_map_iter(at_heading).collect();
-    suppress_non_maxima(all, MAX_CANDIDATES).into_iter().map(|(_, shift)| shift).collect()
+    suppress_non_maxima(all, region.candidates.1, region.up.1).into_iter().map(|(_, shift)| shift).collect()
 }
 
 /// The `count` candidates with the most hits, after non-maximum suppression.
-fn suppress_non_maxima(mut all: Vec<(usize, GridPose)>, count: usize) -> Vec<(usize, GridPose)> {
+fn suppress_non_maxima(mut all: Vec<(usize, GridPose)>, count: usize, up: i32) -> Vec<(usize, GridPose)> {
     let max_hits = all.iter().map(|(hits, _)| *hits).max().unwrap_or(0);
     all.retain(|(hits, _)| 2 * hits > max_hits);
     all.sort_unstable_by_key(|(hits, shift)| (Reverse(*hits), *shift));
@@ -322,7 +325,7 @@ fn suppress_non_maxima(mut all: Vec<(usize, GridPose)>, count: usize) -> Vec<(us
         if chosen.len() == count {
             break;
         }
-        if chosen.iter().all(|(_, other)| !other.is_near(&one.1)) {
+        if chosen.iter().all(|(_, other)| !other.is_near(&one.1, up)) {
             chosen.push(one);
         }
     }

@@ -1,7 +1,7 @@
 //! Pose of observed surfels in a map, and distances between poses.
 
 use nalgebra::{Matrix6, Vector6};
-use zsim_base::geometry::{Pose, Rotation, Vector};
+use zsim_base::geometry::{Pose, Rotation, Vector, roll_pitch_yaw};
 
 /// Pose of a query found in a map.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +26,15 @@ pub struct LocalisedPose {
 const LIKELY_SCORE: f64 = 0.1;
 
 impl LocalisedPose {
+    /// How much matches, with the pose of the head as an argument of `--start`.
+    pub(crate) fn at_head(&self, query_from_head: &Pose) -> String {
+        let map_from_head = self.map_from_query * query_from_head;
+        let at = map_from_head.translation.vector;
+        let yaw_deg = roll_pitch_yaw(&map_from_head.rotation).2.to_degrees();
+        let percent = 100.0 * self.inlier_ratio;
+        format!("{percent:.0} % at x,y,z,yaw = {:.1},{:.1},{:.1},{yaw_deg:.0}", at.x, at.y, at.z)
+    }
+
     /// The largest standard deviation of the position over all directions, m.
     pub(super) fn position_sigma_m(&self) -> f64 {
         self.covariance.fixed_view::<3, 3>(3, 3).into_owned().symmetric_eigenvalues().max().max(0.0).sqrt()

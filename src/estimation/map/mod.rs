@@ -6,7 +6,6 @@ mod limits;
 mod localised_pose;
 mod relocaliser;
 
-pub(super) use global_check::NotFoundAnywhere;
 pub(super) use limits::RelocalisationLimits;
 pub use localised_pose::LocalisedPose;
 pub(super) use relocaliser::Relocaliser;

@@ -38,13 +38,14 @@ const MAX_UNOBSERVABLE: f64 = 1.5;
 /// Information that fixes the pose along unobservable directions, 1/m^2: larger than that of all matches.
 const FIXED_INFORMATION: f64 = 1e12;
 /// Minimum number of finest query patches for a relocalisation.
-pub(super) const MIN_PATCHES: usize = 50;
+const MIN_PATCHES: usize = 50;
 /// Poses that converged to within this distance, m and rad, are duplicates.
 const DUPLICATE_POSE_TOLERANCE: f64 = 0.01;
 /// Two poses are different above this distance, m, or angle, rad.
 const DIFFERENT_POSE: (f64, f64) = (0.3, 0.1);
-/// A different pose competes with the best one if it has at least this fraction of the score of the best.
-const COMPETING_SCORE: f64 = 0.85;
+/// A different pose competes with the best one if it has at least this fraction of the score of the best; in a whole map, of its
+/// inlier ratio.
+pub(super) const COMPETING_SCORE: f64 = 0.85;
 /// After a gap a pose is rejected if another with more than this multiple of its score is farther away than this, m.
 const ALTERNATIVE: (f64, f64) = (0.5, 1.0);
 
@@ -142,10 +143,7 @@ impl Relocaliser {
         limits: &RelocalisationLimits,
     ) -> Result<LocalisedPose, String> {
         let patches_by_level = self.patches_by_level(query);
-        let finest = patches_by_level.first().map_or(0, Vec::len);
-        if finest < MIN_PATCHES {
-            return Err(format!("the query has {finest} finest surfels, at least {MIN_PATCHES} are needed"));
-        }
+        check_size(query)?;
         let poses = self.refine_all(&patches_by_level, limits.starts(map_from_query, from), from);
         let evaluated =
             self.evaluate_all(&patches_by_level[..limits.levels.min(self.matcher.levels)], from, &poses, limits.gate_m);
@@ -307,6 +305,16 @@ impl Relocaliser {
             sums.squares += distance_m * distance_m;
         }
         sums
+    }
+}
+
+/// Refuses a query with too few of the finest patches.
+pub(super) fn check_size(query: &[Patch]) -> Result<(), String> {
+    match query.iter().filter(|patch| patch.level == 0).count() {
+        finest if finest < MIN_PATCHES => {
+            Err(format!("the query has {finest} finest surfels, at least {MIN_PATCHES} are needed"))
+        }
+        _ => Ok(()),
     }
 }
 
