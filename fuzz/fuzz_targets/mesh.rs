@@ -4,8 +4,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::path::PathBuf;
-use zsim::spec::{Source, parse};
-use zsim::world::World;
+use zsim_base::spec::{Source, parse};
+use zsim_world::World;
 
 const FORMATS: [&str; 5] = ["obj", "stl", "ply", "gltf", "glb"];
 
@@ -14,7 +14,9 @@ fuzz_target!(|data: &[u8]| {
     let file = format!("m.{}", FORMATS[usize::from(*format) % FORMATS.len()]);
     // In memory on most systems, so that a run writes no disk.
     let folder = PathBuf::from(format!("/dev/shm/zsim-fuzz-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(folder.join(&file), bytes)).expect("a folder for the mesh");
+    std::fs::create_dir_all(&folder)
+        .and_then(|()| std::fs::write(folder.join(&file), bytes))
+        .expect("a folder for the mesh");
     let text = format!(
         "(name: \"s\", materials: {{\"a\": (reflectance: 0.5)}}, items: [Solid(shape: Mesh(file: \"{file}\"), material: \"a\")])"
     );

@@ -3,14 +3,14 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use zsim::dynamics::{HeadModel, HeadSpec};
-use zsim::elasticity::SpringSpec;
-use zsim::estimation::EstimatorSpec;
-use zsim::motion::MotionSpec;
-use zsim::sensors::{Clocks, ClocksSpec, ImuSpec, LidarSpec};
-use zsim::spec::{Source, parse};
-use zsim::time::Stamp;
-use zsim::world::SceneSpec;
+use zsim_base::spec::{Source, parse};
+use zsim_base::time::Stamp;
+use zsim_dynamics::{HeadModel, HeadSpec};
+use zsim_elasticity::SpringSpec;
+use zsim_estimation::EstimatorSpec;
+use zsim_motion::MotionSpec;
+use zsim_sensors::{Clocks, ClocksSpec, ImuSpec, LidarSpec};
+use zsim_world::SceneSpec;
 
 fuzz_target!(|data: &[u8]| {
     let Some((kind, text)) = data.split_first() else { return };

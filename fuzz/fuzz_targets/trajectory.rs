@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use zsim::recording::{PlyReader, parse_surfel_map, parse_tum};
+use zsim_recording::{PlyReader, parse_surfel_map, parse_tum};
 
 fuzz_target!(|data: &[u8]| {
     let _ = parse_tum("fuzz", data);

@@ -1,10 +1,10 @@
 //! Reading of a recording, shared by the fuzz targets.
 
 use std::io::{Read, Seek};
-use zsim::geometry::Pose;
-use zsim::measurement::{Calibration, ImuAveraging, ImuNoise, LidarNoise};
-use zsim::recording::{TopicPreference, Reader};
-use zsim::time::Span;
+use zsim_base::geometry::Pose;
+use zsim_base::measurement::{Calibration, ImuAveraging, ImuNoise, LidarNoise};
+use zsim_base::time::Span;
+use zsim_recording::{Reader, TopicPreference};
 
 /// Reads all contents of a recording: info, truth, and the measurements for each lidar topic.
 pub fn read_all(file: impl Read + Seek + Send + 'static) {
