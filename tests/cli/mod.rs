@@ -5,6 +5,7 @@ mod commands;
 mod compare;
 mod document_blocks;
 mod documents;
+mod edited;
 mod examples;
 mod gains;
 mod hostile;
