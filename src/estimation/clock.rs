@@ -1,6 +1,6 @@
 //! The offset between the clocks of IMU and lidar.
 
-use super::spec::{EstimatorSpec, Formulation};
+use super::spec::EstimatorSpec;
 
 /// Maximum time over which the clock drift is extrapolated, s.
 ///
@@ -10,7 +10,7 @@ const MAX_EXTRAPOLATION_S: f64 = 60.0;
 
 /// Offset between the IMU clock and the lidar clock: IMU time `u = tau + l(tau)`, with lidar time `tau`.
 ///
-/// The trajectory is in IMU time, or in lidar time in the paper's formulation.
+/// The trajectory is in IMU time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Clock {
     /// Offset `l` at `at_s`, s: positive if IMU stamps are later.
@@ -19,14 +19,12 @@ pub(super) struct Clock {
     pub(super) rate: f64,
     /// Reference time of `offset_s`, lidar time, s.
     pub(super) at_s: f64,
-    /// Decides whether the trajectory is in IMU time or in lidar time.
-    pub(super) formulation: Formulation,
 }
 
 impl Clock {
     /// The clock at the start of the data, at `at_s`, s.
     pub(super) fn starting(spec: &EstimatorSpec, at_s: f64) -> Self {
-        Self { offset_s: spec.clock.start_s, rate: 0.0, at_s, formulation: spec.formulation }
+        Self { offset_s: spec.clock.start_s, rate: 0.0, at_s }
     }
 
     /// The offset at `tau_s`, lidar time, s.
@@ -36,34 +34,12 @@ impl Clock {
 
     /// Converts lidar time to the time of the trajectory, s.
     pub(super) fn trajectory_s(&self, tau_s: f64) -> f64 {
-        match self.formulation {
-            Formulation::ImuTime => tau_s + self.offset_at(tau_s),
-            Formulation::Paper => tau_s,
-        }
+        tau_s + self.offset_at(tau_s)
     }
 
     /// Converts the time of the trajectory to lidar time, s.
     pub(super) fn lidar_s(&self, trajectory_s: f64) -> f64 {
-        match self.formulation {
-            Formulation::ImuTime => trajectory_s - self.offset_at(trajectory_s),
-            Formulation::Paper => trajectory_s,
-        }
-    }
-
-    /// Converts IMU time to the time of the trajectory, s.
-    pub(super) fn trajectory_from_imu_s(&self, u_s: f64) -> f64 {
-        match self.formulation {
-            Formulation::ImuTime => u_s,
-            Formulation::Paper => u_s - self.offset_at(u_s),
-        }
-    }
-
-    /// Converts the time of the trajectory to IMU time, s.
-    pub(super) fn imu_from_trajectory_s(&self, trajectory_s: f64) -> f64 {
-        match self.formulation {
-            Formulation::ImuTime => trajectory_s,
-            Formulation::Paper => trajectory_s + self.offset_at(trajectory_s),
-        }
+        trajectory_s - self.offset_at(trajectory_s)
     }
 
     /// The same clock after a gap from `from_s` to `to_s`.
@@ -84,7 +60,7 @@ mod tests {
 
     #[test]
     fn the_drift_is_extrapolated_for_at_most_a_minute() {
-        let clock = Clock { offset_s: 0.003, rate: 1e-4, at_s: 10.0, formulation: Formulation::ImuTime };
+        let clock = Clock { offset_s: 0.003, rate: 1e-4, at_s: 10.0 };
         let day = clock.after_gap(15.0, 86_415.0);
         assert!((day.offset_at(86_415.0) - (0.0035 + 1e-4 * MAX_EXTRAPOLATION_S)).abs() < 1e-12, "{day:?}");
         let second = clock.after_gap(15.0, 16.0);

@@ -233,11 +233,9 @@ fn information(
     sigmas[LIDAR_ROTATION..LIDAR_ROTATION + 3].fill(turn.max(1e-9));
     sigmas[LIDAR_TRANSLATION..LIDAR_TRANSLATION + 3].fill(shift.max(1e-9));
     let of_model = ImuScaleMisalignment::sigmas_of(noise);
-    for (start, of_model, setting) in [
-        (GYRO_MATRIX, of_model.gyro, inertial.gyro_matrix_sigma),
-        (ACCEL_MATRIX, of_model.accel, inertial.accel_matrix_sigma),
-    ] {
-        let sigma = |of_model: f64| if setting > 0.0 { of_model.max(setting) } else { 1e-9 };
+    let least = inertial.matrix_sigma;
+    for (start, of_model) in [(GYRO_MATRIX, of_model.gyro), (ACCEL_MATRIX, of_model.accel)] {
+        let sigma = |of_model: f64| if least > 0.0 { of_model.max(least) } else { 1e-9 };
         // The entries are in the order of rows.
         of_model.transpose().iter().zip(&mut sigmas[start..start + 9]).for_each(|(model, into)| *into = sigma(*model));
     }

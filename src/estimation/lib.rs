@@ -37,8 +37,7 @@
 //! - The trajectory is that of the IMU, in IMU time. The clock offset `l` enters in the lookup of the beam times, `u =
 //!   tau + l(tau)`. The paper has the trajectory in lidar time and `l` in the IMU residuals. Here a change of `l` also
 //!   shifts the fast motion, which only the IMU measures; otherwise the smooth splines would have to follow it at the
-//!   rocking frequency of the head. The IMU residuals need no lever arm either. [`Formulation::Paper`] is the paper's
-//!   form, for comparison.
+//!   rocking frequency of the head. The IMU residuals need no lever arm either.
 //! - The IMU residuals compare velocities, corrected by the exact derivative of the spline, so no second difference of
 //!   positions is needed.
 //! - A match may link any two times of the window, so the information matrix of the knots may be full. The solver stores
@@ -70,7 +69,6 @@ mod error;
 mod estimator;
 mod event;
 mod gaps;
-mod imu_signal;
 mod inertial;
 mod initial;
 mod intake;
@@ -110,8 +108,8 @@ pub use observed::ObservedSurfels;
 pub use output::{ALIGNMENT_S, EstimatedPose, MatrixEntry, OpenLoop, TURN_LEVER_M, WindowReport};
 pub use registration::{ClosedLoop, LoopReport, RegistrationInput, RegistrationReport, register};
 pub use spec::{
-    ClockSpec, EstimatorSpec, Formulation, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec,
-    SurfelSpec, ViewSpec, load,
+    ClockSpec, EstimatorSpec, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec, SurfelSpec,
+    ViewSpec, load,
 };
 pub use stamps::smoothed_stamps;
 pub use timing::{PartTime, Timing};

@@ -97,14 +97,18 @@ impl Matcher {
         let mut pairs = Vec::new();
         for (i, surfel) in placed.iter().enumerate() {
             for j in neighbours[i].iter().map(|j| *j as usize) {
-                let mutual = neighbours[j].contains(&(i as u32));
-                let first_of_both = i < j || !mutual;
-                if first_of_both && (mutual || !self.spec.reciprocal) && self.separated_in_time(surfel, &placed[j]) {
-                    pairs.push((i.min(j) as u32, i.max(j) as u32));
+                let is_mutual = i < j && neighbours[j].contains(&(i as u32));
+                if is_mutual && self.separated_in_time(surfel, &placed[j]) {
+                    pairs.push((i as u32, j as u32));
                 }
             }
         }
         pairs
+    }
+
+    /// Maximum distance of a match along the normal, m.
+    pub(super) fn max_plane_distance_m(&self) -> f64 {
+        self.spec.max_plane_distance_m
     }
 
     /// Whether the times of two surfels differ by at least the minimum.

@@ -4,7 +4,7 @@ use super::spline::Basis;
 use super::strapdown::{Biases, ImuScaleMisalignment, Interval, State};
 use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
 
-/// Nominal trajectory: states at the boundaries of the IMU intervals, in IMU time unless the formulation is the paper's.
+/// Nominal trajectory: states at the boundaries of the IMU intervals, in IMU time.
 ///
 /// In IMU time a change of the clock offset does not change the trajectory. In lidar time, the corrections would have to
 /// shift the fast motion, which only the IMU measures. Lidar time `tau` corresponds to `u = tau + l(tau)`.
@@ -60,11 +60,6 @@ impl Nominal {
         let (time, state) = (time + interval.h, state.after(&interval, biases, gravity));
         self.times_s.push(time);
         self.states.push(state);
-        self.push_readings(interval);
-    }
-
-    /// Appends the readings of an interval.
-    fn push_readings(&mut self, interval: Interval) {
         // At a boundary the measured rate is about the mean of both sides; the outermost nodes have one side only.
         let half_slope = interval.gyro_slope * (0.5 * interval.h);
         if let Some(rate) = self.rates.last_mut() {
@@ -73,16 +68,6 @@ impl Nominal {
         }
         self.rates.push(interval.gyro + half_slope);
         self.intervals.push(interval);
-    }
-
-    /// Replaces the readings of all intervals by `readings`, a function of start and end, s; the states do not change.
-    pub(super) fn replace_readings(&mut self, readings: impl Fn(f64, f64) -> Option<Interval>) {
-        let old = std::mem::take(&mut self.intervals);
-        self.rates = vec![Vector::zeros()];
-        for (k, old) in old.into_iter().enumerate() {
-            let new = readings(self.times_s[k], self.times_s[k + 1]).unwrap_or(old);
-            self.push_readings(Interval { h: old.h, ..new });
-        }
     }
 
     /// Removes the nodes before `time_s`, except the last one at or before it.

@@ -104,7 +104,7 @@ impl Mapped {
         let travelled = RegistrationInput { map_from_head: trajectory, covariances: &covariances, lidar, observed };
         let closed = register(travelled, &session.calibration, &spec()).unwrap();
         let (open, closed_trajectory) = (&run.trajectory, &closed.trajectory);
-        let map = map_of(&run.observed, open, closed_trajectory, &covariances, &spec().registration).unwrap();
+        let map = map_of(&run.observed, open, closed_trajectory, &covariances, &spec()).unwrap();
         let pairs = Pairs::associate(&closed.trajectory, &session.truth).unwrap();
         let world_from_map = pairs.world_from_map().unwrap();
         let rmse_m = Errors::after(&pairs, &world_from_map).position_rmse_m();
@@ -280,7 +280,7 @@ impl Surfaces {
         let start = second.session.start_in(&first.world_from_map);
         let run = second.session.estimate(Some((&first.map, Some(&start)))).unwrap();
         let (open, covariances) = (&run.trajectory, covariances(&run.poses));
-        let seen = map_of(&run.observed, open, open, &covariances, &spec().registration).unwrap();
+        let seen = map_of(&run.observed, open, open, &covariances, &spec()).unwrap();
         let extended = merge_maps(&first.map, &seen, &Pose::identity()).unwrap();
         Self {
             worse_part_m: parts[0].max(parts[1]),

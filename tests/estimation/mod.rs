@@ -6,7 +6,6 @@ mod base;
 mod corridors;
 mod faults;
 mod fixture;
-mod formulation;
 mod lidar_gaps;
 mod maps;
 mod registration;

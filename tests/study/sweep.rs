@@ -256,7 +256,7 @@ const WALKS: &str = r#"(
         levels(name: "variant", levels: [
             (name: "base"),
             (name: "the same"),
-            (name: "no offset grids", set: { "estimator.offset_grids": false }),
+            (name: "short window", set: { "estimator.window_s": 3.0 }),
         ]),
     ],
     sampling: grid,
@@ -456,7 +456,7 @@ fn invalid_sweeps_are_errors_with_the_line() {
     wrong(WALKS, "\"tactical\"", "\"nosuch\"", &["no such IMU"]);
     wrong(WALKS, "(name: \"the same\")", "(name: \"base\")", &["more than once"]);
     wrong(WALKS, "(name: \"the same\")", "(name: \"a, b\")", &["commas"]);
-    wrong(WALKS, "estimator.offset_grids", "estimator.offset_grid", &["bad.ron:11:", "offset_grid"]);
+    wrong(WALKS, "estimator.window_s", "estimator.windw_s", &["bad.ron:11:", "windw_s"]);
     wrong(WALKS, "\"mocap_room\"", "\"nowhere\"", &["no such scene"]);
     wrong(WALKS, "memory_mib: 2048", "memory_mib: 2048, cores: 2", &["cores"]);
 }

@@ -71,7 +71,7 @@ impl SpecError {
     }
 
     /// The key that the type does not have, if this is the error.
-    pub(super) fn unknown_key(&self) -> Option<&str> {
+    pub fn unknown_key(&self) -> Option<&str> {
         match self.key.as_deref()? {
             KeyFault::Unknown(key) => Some(key),
             KeyFault::Missing(_) => None,

@@ -12,7 +12,7 @@ pub(super) use relocaliser::Relocaliser;
 
 use super::observed::{ObservedSurfel, ObservedSurfels};
 use super::surfel::Patch;
-use super::{EstimationError, EstimatorSpec, RegistrationSpec};
+use super::{EstimationError, EstimatorSpec, SurfelSpec};
 use nalgebra::Matrix6;
 use zsim_base::geometry::{Matrix, Pose, PoseCovariance, Trajectory, Vector, skew};
 use zsim_base::surfel_map::{MapSurfel, SurfelMap, SurfelMapError};
@@ -30,7 +30,7 @@ pub fn map_of(
     open_loop: &Trajectory,
     best: &Trajectory,
     covariances: &[(Stamp, PoseCovariance)],
-    spec: &RegistrationSpec,
+    spec: &EstimatorSpec,
 ) -> Result<SurfelMap, EstimationError> {
     let mut surfels: Vec<_> = observed.surfels.iter().collect();
     surfels.sort_by(|a, b| a.tau_s.total_cmp(&b.tau_s));
@@ -45,7 +45,8 @@ pub fn map_of(
         Some(patch.to_map_surfel((of_pose + thin / patch.points).sqrt()))
     };
     let surfels: Vec<MapSurfel> = surfels.iter().filter_map(moved).collect();
-    map_from(spec.finest_voxel_m, spec.levels, surfels)
+    let SurfelSpec { finest_voxel_m, levels, .. } = spec.registration.surfels(&spec.surfels);
+    map_from(finest_voxel_m, levels, surfels)
 }
 
 /// Registers the map `other` to `map`, starting at the pose `start`.

@@ -55,8 +55,6 @@ pub(crate) struct Relocaliser {
     matcher: Matcher,
     patches: Vec<Patch>,
     trees: SearchTrees,
-    /// Factor on the covariance.
-    inflation: f64,
     /// Standard deviation of a match in addition to surfel thickness, m.
     sigma_m: f64,
 }
@@ -104,13 +102,7 @@ impl Relocaliser {
             max_normal_angle_deg: NORMAL_GATE_DEG.max(matching.max_normal_angle_deg),
             ..matching.clone()
         };
-        Self {
-            matcher: Matcher::new(&wide, surfels),
-            patches,
-            trees,
-            inflation: solve.covariance_inflation,
-            sigma_m: solve.match_sigma_m,
-        }
+        Self { matcher: Matcher::new(&wide, surfels), patches, trees, sigma_m: solve.match_sigma_m }
     }
 
     /// The map's patches.
@@ -267,7 +259,7 @@ impl Relocaliser {
         // Along unobservable directions the standard deviation is 1 m and 1 rad.
         let observable = Matrix6::identity() - unobservable;
         let information = observable * sums.information * observable + Matrix6::identity();
-        let covariance = information.try_inverse()? * self.inflation;
+        let covariance = information.try_inverse()?;
         let residual_rms_m = (sums.squares / sums.matched.max(1) as f64).sqrt();
         let inlier_ratio = sums.matched as f64 / patches_by_level.iter().map(Vec::len).sum::<usize>() as f64;
         let agreement = sums.matched as f64 / sums.with_neighbour.max(1) as f64;

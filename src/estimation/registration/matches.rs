@@ -84,6 +84,8 @@ pub(super) struct Matches<'a> {
     pub(super) spec: &'a RegistrationSpec,
     /// Maximum distance along the normal, m.
     pub(super) gate_m: f64,
+    /// Minimum time between the surfels of a match that counts as a revisit, s.
+    pub(super) revisit_s: f64,
     /// Direction with the least information in the previous iteration.
     pub(super) weakest: Vector,
 }
@@ -138,7 +140,7 @@ impl Matches<'_> {
             sum.shared_term.add(&by_shared, plane.distance_m, weight);
             sum.statistics.count(&plane, weight);
             if !self.scene.are_of_one_submap(i, j) {
-                let is_revisit = self.scene.time_difference_s(i, j) > self.spec.again_after_s;
+                let is_revisit = self.scene.time_difference_s(i, j) > self.revisit_s;
                 sum.statistics.inform(&plane, weight, &self.weakest, is_revisit);
             }
         }
@@ -159,6 +161,6 @@ impl Matches<'_> {
         let weight_share = |k: usize| 1.0 / f64::from(self.neighbours.counts[k].max(1));
         let normalised2 = plane.distance_m * plane.distance_m / plane.variance;
         let robust = 1.0 / (1.0 + normalised2 / (self.spec.cauchy * self.spec.cauchy));
-        self.spec.match_weight * (weight_share(i) + weight_share(j)) * robust / plane.variance
+        (weight_share(i) + weight_share(j)) * robust / plane.variance
     }
 }

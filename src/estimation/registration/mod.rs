@@ -63,6 +63,8 @@ use zsim_base::time::Stamp;
 
 /// Maximum correction in one solve, m and rad; a larger one is rejected as implausible.
 const MAX_CORRECTION: (f64, f64) = (20.0, 1.0);
+/// Matches after this number of windows are revisits: the windows of the open loop already use those before.
+const REVISIT_WINDOWS: f64 = 2.5;
 /// Maximum number of registrations after a loop closure, each with the last result as open loop.
 const MAX_ROUNDS: usize = 6;
 /// These registrations end when the trajectory moves by less than this, m.
@@ -178,14 +180,12 @@ fn register_without_gaps(
     calibration: &Calibration,
     spec: &EstimatorSpec,
 ) -> Result<ClosedLoop, EstimationError> {
-    let registration = &spec.registration;
-    let matcher = Matcher::new(&registration.matching(&spec.matching), &registration.surfels(&spec.surfels));
+    let matcher = Matcher::new(&spec.matching, &spec.registration.surfels(&spec.surfels));
     let RegistrationInput { map_from_head, lidar, observed, .. } = input;
     let recalibrate = || lidar_model::recalibrated(map_from_head, observed, calibration, lidar);
     let recalibrated = spec.extrinsics.estimated.then(recalibrate).transpose()?;
     let map_from_head = recalibrated.as_ref().unwrap_or(map_from_head);
-    let problem =
-        Problem { input: RegistrationInput { map_from_head, ..input }, spec: registration, matcher: &matcher };
+    let problem = Problem { input: RegistrationInput { map_from_head, ..input }, spec, matcher: &matcher };
     let closed = match problem.solve(LidarModel::new(calibration, lidar, observed, spec)) {
         Ok((Registered { trajectory, covariances, lidar_model }, report)) => {
             let moved = largest_difference(map_from_head, &trajectory);
@@ -215,7 +215,7 @@ type RegistrationResult<T> = Result<(T, RegistrationReport), Box<(RegistrationRe
 #[derive(Clone, Copy)]
 struct Problem<'a> {
     input: RegistrationInput<'a>,
-    spec: &'a RegistrationSpec,
+    spec: &'a EstimatorSpec,
     matcher: &'a Matcher,
 }
 
@@ -232,12 +232,14 @@ impl Problem<'_> {
     fn solve(&self, lidar_model: LidarModel) -> RegistrationResult<Registered> {
         let empty = RegistrationReport::default();
         let RegistrationInput { map_from_head, covariances, observed, .. } = self.input;
-        let by_views = combined_with_open_loop(&observed.by_views, map_from_head, observed.origin, self.spec);
+        let by_views =
+            combined_with_open_loop(&observed.by_views, map_from_head, observed.origin, &self.spec.registration);
         let sensed = sensed_motion(map_from_head, &by_views, observed.origin)
             .map_err(|_| Box::new((empty, "the motion is not finite")))?;
-        let corrected = CorrectedTrajectory::new(map_from_head, &sensed, covariances, observed.origin, self.spec);
+        let corrected =
+            CorrectedTrajectory::new(map_from_head, &sensed, covariances, observed.origin, &self.spec.registration);
         let corrected = corrected.ok_or_else(|| Box::new((empty, "no trajectory")))?;
-        let corrected = corrected.weighted_by(&by_views, observed.origin, self.spec);
+        let corrected = corrected.weighted_by(&by_views, observed.origin, &self.spec.registration);
         let (loops, pre_aligned) = places::close_loops(map_from_head, observed, &corrected, self.matcher, self.spec);
         let report = RegistrationReport { loops, ..empty };
         if let Some(pre_aligned) = pre_aligned {
@@ -245,7 +247,8 @@ impl Problem<'_> {
         }
         let (Solution { corrected, lidar_model, equations }, report) =
             Registration::run(self, corrected, lidar_model, observed, report)?;
-        if report.conditioning < self.spec.weak_conditioning && report.revisited < self.spec.min_seen_again {
+        let RegistrationSpec { weak_conditioning, min_seen_again, .. } = self.spec.registration;
+        if report.conditioning < weak_conditioning && report.revisited < min_seen_again {
             return Err(Box::new((report, "too few revisited surfaces constrain the weakest direction")));
         }
         let covariances = self.covariances(&corrected, &equations, report)?;
@@ -262,7 +265,7 @@ impl Problem<'_> {
         report: RegistrationReport,
     ) -> Result<Vec<PoseCovariance>, Box<(RegistrationReport, &'static str)>> {
         let of_open_loop = self.input.covariances;
-        if report.revisited < self.spec.min_seen_again {
+        if report.revisited < self.spec.registration.min_seen_again {
             return Ok(of_open_loop.iter().map(|(_, covariance)| *covariance).collect());
         }
         uncertainty::covariances(corrected, equations, of_open_loop).ok_or_else(|| Box::new((report, SINGULAR)))
@@ -283,7 +286,7 @@ impl Problem<'_> {
         loop {
             round += 1;
             let (start, origin) = (&pre_aligned.trajectory, pre_aligned.observed.origin);
-            let corrected = CorrectedTrajectory::new(start, start, covariances, origin, self.spec);
+            let corrected = CorrectedTrajectory::new(start, start, covariances, origin, &self.spec.registration);
             let corrected = corrected.ok_or_else(|| Box::new((report, "no trajectory")))?;
             let corrected = corrected.with_gravity_from(map_from_head, &pre_aligned.trajectory);
             let registered = Registration::run(self, corrected, lidar_model, &pre_aligned.observed, report)?;
@@ -319,7 +322,7 @@ struct Solution {
 
 /// State of the iterations.
 struct Registration<'a> {
-    spec: &'a RegistrationSpec,
+    spec: &'a EstimatorSpec,
     matcher: &'a Matcher,
     corrected: CorrectedTrajectory,
     lidar_model: LidarModel,
@@ -339,7 +342,7 @@ impl<'a> Registration<'a> {
         report: RegistrationReport,
     ) -> RegistrationResult<Solution> {
         let (spec, matcher) = (problem.spec, problem.matcher);
-        let scene = Scene::new(observed, &corrected, &lidar_model, spec);
+        let scene = Scene::new(observed, &corrected, &lidar_model, &spec.registration);
         let mut registration = Self { spec, matcher, corrected, lidar_model, scene, weakest: Vector::z(), report };
         match registration.refine() {
             Ok(equations) => {
@@ -357,12 +360,12 @@ impl<'a> Registration<'a> {
         self.report.submaps = (self.scene.submaps.len(), self.scene.pairs.len());
         self.report.knots = knots;
         let max_distance_m = self.scene.max_distance_m();
-        let mut neighbours = Neighbours::new(self.spec.levels);
+        let mut neighbours = Neighbours::new(self.matcher.levels);
         let mut equations: Option<Equations> = None;
-        for finest in (0..self.spec.levels).rev() {
+        for finest in (0..self.matcher.levels).rev() {
             let coarser = f64::from(1_u32 << finest);
-            for _ in 0..self.spec.max_iterations {
-                let changed = neighbours.update(finest, &self.scene, self.matcher, self.spec.neighbours);
+            for _ in 0..self.spec.solve.max_iterations {
+                let changed = neighbours.update(finest, &self.scene, self.matcher, self.spec.views.neighbours);
                 let equations = match &mut equations {
                     Some(same) if !changed => {
                         same.clear();
@@ -370,7 +373,7 @@ impl<'a> Registration<'a> {
                     }
                     other => other.insert(self.empty_equations(&neighbours)),
                 };
-                let statistics = self.assemble(&neighbours, self.spec.max_plane_distance_m * coarser, equations);
+                let statistics = self.assemble(&neighbours, coarser, equations);
                 let (x, step) = equations.solve().ok_or(SINGULAR)?;
                 let three = Vector::from_column_slice;
                 let knots = x.chunks_exact(6).map(|knot| (three(&knot[..3]), three(&knot[3..])));
@@ -386,7 +389,7 @@ impl<'a> Registration<'a> {
                 self.report.iterations += 1;
                 self.describe(&statistics);
                 self.report.last_correction_m = translation_m;
-                if translation_m.max(by_lidar_m) < self.spec.settled_m * coarser {
+                if translation_m.max(by_lidar_m) < self.spec.solve.settled_m * coarser {
                     break;
                 }
             }
@@ -416,10 +419,13 @@ impl<'a> Registration<'a> {
         Equations::new(first_knot, knots, linked)
     }
 
-    fn assemble(&self, neighbours: &Neighbours, gate_m: f64, equations: &mut Equations) -> MatchStatistics {
-        let (scene, matcher, spec) = (&self.scene, self.matcher, self.spec);
+    /// Adds all terms to `equations`; matches with a gate that is `coarser` than that of the finest resolution.
+    fn assemble(&self, neighbours: &Neighbours, coarser: f64, equations: &mut Equations) -> MatchStatistics {
+        let (scene, matcher, spec) = (&self.scene, self.matcher, &self.spec.registration);
+        let gate_m = spec.max_plane_distance_m * coarser;
         let (neighbours, weakest) = (&neighbours.active, self.weakest);
-        let matches = Matches { scene, neighbours, matcher, spec, gate_m, weakest };
+        let revisit_s = REVISIT_WINDOWS * self.spec.window_s;
+        let matches = Matches { scene, neighbours, matcher, spec, gate_m, revisit_s, weakest };
         let statistics = matches.add_to(equations);
         self.corrected.add_to(equations, spec.level_sigma_deg.to_radians());
         self.lidar_model.add_to(&mut equations.shared_term);

@@ -52,7 +52,7 @@ pub(super) fn select_pairs(
             let mut partners: Vec<(usize, usize)> =
                 common.into_iter().filter(|(b, count)| enough(*b, *count)).collect();
             partners.sort_by_key(|(b, count)| (std::cmp::Reverse(*count), *b));
-            partners.truncate(spec.partners);
+            partners.truncate(spec.references);
             let others = partners.into_iter().map(move |(b, _)| (a.min(b), a.max(b)));
             others.chain([(a, a)])
         })

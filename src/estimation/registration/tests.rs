@@ -401,8 +401,7 @@ impl PatchesOfWall {
         };
         let observed = ObservedSurfels { surfels: vec![surfel(0), surfel(1)], ..observed };
         let corrected = CorrectedTrajectory::new(&open, &open, &covariances, observed.origin, &spec.registration);
-        let matching = &spec.registration.matching(&spec.matching);
-        let matcher = Matcher::new(matching, &spec.registration.surfels(&spec.surfels));
+        let matcher = Matcher::new(&spec.matching, &spec.registration.surfels(&spec.surfels));
         let lidar_model = LidarModel::new(&calibration(), &LidarCorrection::default(), &observed, &spec);
         Self { corrected: corrected.unwrap(), spec, observed, lidar_model, matcher }
     }
@@ -413,10 +412,11 @@ impl PatchesOfWall {
 
     fn sum(&self, scene: &Scene) -> BinPairSums {
         let (spec, matcher) = (&self.spec.registration, &self.matcher);
-        let mut neighbours = Neighbours::new(spec.levels);
+        let mut neighbours = Neighbours::new(matcher.levels);
         neighbours.update(0, scene, matcher, 1);
         let neighbours = &neighbours.active;
-        Matches { scene, neighbours, matcher, spec, gate_m: 0.1, weakest: Vector::z() }.sum(&neighbours.pairs)
+        Matches { scene, neighbours, matcher, spec, gate_m: 0.1, revisit_s: 10.0, weakest: Vector::z() }
+            .sum(&neighbours.pairs)
     }
 }
 
@@ -454,14 +454,13 @@ fn a_match_of_few_points_has_the_variance_of_its_means() {
     let match_of = |points: f64| {
         let patches = PatchesOfWall::of_points(points);
         let scene = patches.scene();
-        (patches.sum(&scene).statistics, patches.spec.registration)
+        patches.sum(&scene).statistics
     };
-    let (full, spec) = match_of(full_points);
-    let (few, _) = match_of(0.25 * full_points);
+    let (full, few) = (match_of(full_points), match_of(0.25 * full_points));
     let variance = PatchesOfWall::of_points(full_points).observed.surfels[0].patch.covariance[(0, 0)];
     // With a Cauchy kernel the inverse weight is the variance plus a multiple of the squared distance; each of the two surfels
     // has one match.
-    let added = (few.weights.recip() - full.weights.recip()) * 2.0 * spec.match_weight;
+    let added = (few.weights.recip() - full.weights.recip()) * 2.0;
     assert!((added / (2.0 * 3.0 * variance) - 1.0).abs() < 1e-6, "{added} and {variance}");
-    assert_eq!(match_of(2.0 * full_points).0.weights, full.weights);
+    assert_eq!(match_of(2.0 * full_points).weights, full.weights);
 }

@@ -1,8 +1,8 @@
-//! Residuals of one IMU interval or sum of intervals, with their derivatives; see `inertial` and `paper` for the equations.
+//! Residuals of one IMU interval or sum of intervals, with their derivatives; see `inertial` for the equations.
 
 use super::fast_motion::ByErrors;
 use super::rows::{KNOTS, ResidualRow, ResidualSums};
-use crate::layout::{ACCEL_BIAS, ACCEL_MATRIX, CLOCK, CLOCK_RATE, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
+use crate::layout::{ACCEL_BIAS, ACCEL_MATRIX, GRAVITY, GYRO_BIAS, GYRO_MATRIX, Layout};
 use crate::normal_equations::NormalEquations;
 use crate::spline::Basis;
 use crate::strapdown::{Biases, Interval, State};
@@ -77,8 +77,6 @@ pub(super) struct GyroResidual {
     by_turn: [f64; KNOTS],
     /// By the bias, and by the columns of the scale and misalignment matrix.
     by_gyro: ByErrors,
-    /// By the clock offset and the clock rate; zero if the trajectory is in IMU time.
-    by_clock: [Vector; 2],
 }
 
 impl GyroResidual {
@@ -93,18 +91,12 @@ impl GyroResidual {
         }
         let w = &interval.gyro;
         let by_gyro = [1.0, w.x, w.y, w.z].map(|reading| terms.map_from_end * (h * reading));
-        Self { sum, by_turn, by_gyro, by_clock: [Vector::zeros(); 2] }
+        Self { sum, by_turn, by_gyro }
     }
 
     /// The same residual of states that take the fast changes by the gyroscope's errors.
     pub(super) fn with_fast_motion(self, by_gyro: ByErrors) -> Self {
         Self { by_gyro, ..self }
-    }
-
-    /// The same residual of a trajectory in lidar time; the middle of the interval is `time_s` after the clock's reference.
-    pub(super) fn with_clock(self, terms: &Inertial, interval: &Interval, time_s: f64) -> Self {
-        let by_offset = -(terms.map_from_end * interval.gyro_slope) * interval.h;
-        Self { by_clock: [by_offset, by_offset * time_s], ..self }
     }
 
     pub(super) fn add_to(&self, rows: &mut ResidualSums, equations: &mut NormalEquations, layout: &Layout) {
@@ -120,8 +112,6 @@ impl GyroResidual {
             for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
                 *row.border(GYRO_MATRIX + 3 * i + j) = self.by_gyro[1 + j][(axis, i)];
             }
-            *row.border(CLOCK) = self.by_clock[0][axis];
-            *row.border(CLOCK_RATE) = self.by_clock[1][axis];
             rows.add(&row, deviation[axis], variance.recip(), equations, layout);
         }
     }
@@ -138,8 +128,6 @@ pub(super) struct AccelResidual {
     /// By the bias, and by the columns of the scale and misalignment matrix.
     pub by_accel: ByErrors,
     pub by_tilt: Matrix,
-    /// By the clock offset and the clock rate; zero if the trajectory is in IMU time.
-    pub by_clock: [Vector; 2],
 }
 
 impl AccelResidual {
@@ -162,7 +150,6 @@ impl AccelResidual {
             by_turn,
             by_accel: [1.0, f.x, f.y, f.z].map(|reading| terms.map_from_middle * (h * reading)),
             by_tilt: skew(gravity) * h,
-            by_clock: [Vector::zeros(); 2],
         }
     }
 
@@ -186,7 +173,6 @@ impl AccelResidual {
         }
         self.by_accel.iter_mut().zip(&next.by_accel).for_each(|(by, next)| *by += next);
         self.by_tilt += next.by_tilt;
-        self.by_clock.iter_mut().zip(next.by_clock).for_each(|(by, next)| *by += next);
         self.sum.used = self.sum.used.max(offset + used);
         self.sum.deviation += next.sum.deviation;
         self.sum.variance += next.sum.variance;
@@ -220,8 +206,6 @@ impl AccelResidual {
             for i in 0..2 {
                 *row.border(GRAVITY + i) = self.by_tilt[(axis, i)];
             }
-            *row.border(CLOCK) = self.by_clock[0][axis];
-            *row.border(CLOCK_RATE) = self.by_clock[1][axis];
             rows.add(&row, deviation[axis], weight, equations, layout);
         }
     }

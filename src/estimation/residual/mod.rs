@@ -7,7 +7,6 @@ pub(super) mod inertial;
 mod knot_span;
 pub(super) mod matched;
 mod nodes;
-pub(super) mod paper;
 pub(super) mod prior;
 mod rows;
 pub(super) mod sums;

@@ -1,6 +1,6 @@
 //! Default settings: those of `specs/estimators/default.ron`, which is in the binary.
 
-use super::surfel::FineSurfelSpec;
+use super::removed;
 use super::{
     ClockSpec, EstimatorSpec, ExtrinsicsSpec, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec,
     SurfelSpec, ViewSpec,
@@ -33,7 +33,7 @@ impl NamedSpec for EstimatorSpec {
     type Error = SpecError;
 
     fn parse(source: &Source) -> Result<Self, SpecError> {
-        parse_over(source, Some(tree()?))
+        parse_over(source, Some(tree()?)).map_err(removed::explained)
     }
 
     fn check_model(&self, source: &Source) -> Result<Vec<String>, SpecError> {
@@ -64,7 +64,6 @@ macro_rules! parts {
 
 parts! {
     SurfelSpec: surfels;
-    FineSurfelSpec: surfels.fine;
     MatchingSpec: matching;
     SolveSpec: solve;
     InertialSpec: inertial;

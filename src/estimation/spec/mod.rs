@@ -3,12 +3,14 @@
 mod defaults;
 mod places;
 mod registration;
+mod removed;
 mod surfel;
 
 use super::EstimationError;
 pub use places::PlacesSpec;
 pub use registration::RegistrationSpec;
 use serde::{Deserialize, Serialize};
+use surfel::MAX_LEVELS;
 pub use surfel::{MatchingSpec, SurfelSpec};
 use zsim_base::spec::SpecError;
 
@@ -27,9 +29,6 @@ pub struct EstimatorSpec {
     /// Knot spacing of the correction splines, s; 0.03 s to `step_s`.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub knot_spacing_s: f64,
-    /// Time of the trajectory and form of the IMU residuals.
-    #[serde(default)]
-    pub formulation: Formulation,
     /// Maximum number of fixed views (keyframes) that a window is matched with; 0 for none.
     pub fixed_views: usize,
     /// Surfel extraction.
@@ -50,19 +49,6 @@ pub struct EstimatorSpec {
     pub registration: RegistrationSpec,
 }
 
-/// Time of the trajectory and form of the IMU residuals of a window.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Formulation {
-    /// The trajectory is in IMU time, and the clock offset shifts the lidar beams. The residuals of the accelerometer compare
-    /// velocities, also summed over a knot spacing.
-    #[default]
-    ImuTime,
-    /// As in Bosse et al. 2012, section III-B: the trajectory is in lidar time, and the clock offset shifts the IMU samples.
-    /// The residuals of the accelerometer compare second differences of positions, sample by sample. For comparison.
-    Paper,
-}
-
 /// Solution of a window.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -73,24 +59,14 @@ pub struct SolveSpec {
     /// Iterations end when the largest correction is below this, m or rad.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub settled_m: f64,
-    /// Threshold of the Cauchy kernel in the first iteration, in standard deviations.
+    /// Threshold of the Cauchy kernel in the last iteration, in standard deviations; twice this in the first one.
     #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub cauchy_start: f64,
-    /// Threshold of the Cauchy kernel in the last iteration, in standard deviations.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub cauchy_end: f64,
+    pub cauchy: f64,
     /// Standard deviation of the match distance in addition to the surfel thickness, m (`sigma_r` in Bosse et al. 2012).
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub match_sigma_m: f64,
-    /// Factor on the information of a match; below 1 if the errors of matches on a surface are correlated.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub match_weight: f64,
     /// Minimum number of matches of a window; with fewer, the window is dead reckoning with the IMU.
     pub min_matches: usize,
-    /// Factor on the covariance added by the measurements of a window. It accounts for correlations that the equations
-    /// ignore: errors of matches on a surface, and measurements common to overlapping windows.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub covariance_inflation: f64,
     /// Conditioning below which the geometry of a window is degenerate: smallest over largest eigenvalue of the position
     /// information of the matches.
     #[serde(with = "zsim_base::spec::checked::NonNegative")]
@@ -105,13 +81,10 @@ pub struct InertialSpec {
     /// Factor on the calibrated noise densities; accounts for errors that are not white.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub noise_inflation: f64,
-    /// Least prior standard deviation of the estimated scale errors and misalignments (rad) of the gyroscope, 0..1; a larger
+    /// Least prior standard deviation of the estimated scale errors and misalignments (rad) of gyroscope and accelerometer, 0..1; a larger
     /// one of the IMU's model is used instead. 0 to estimate none.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
-    pub gyro_matrix_sigma: f64,
-    /// The same for the accelerometer.
-    #[serde(with = "zsim_base::spec::checked::Fraction")]
-    pub accel_matrix_sigma: f64,
+    pub matrix_sigma: f64,
     /// Residual error of the gyroscope in proportion to the reading, added to the noise, 0..1.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub gyro_scale_error: f64,
@@ -225,10 +198,8 @@ impl EstimatorSpec {
             "knot_spacing_s",
             "gives more than 400 knots per window".into(),
         )?;
-        require((1..=6).contains(&self.surfels.levels), "levels", "must be 1 to 6".into())?;
-        for min_points in [self.surfels.min_points, self.surfels.fine.min_points] {
-            require(min_points >= 4, "min_points", "must be at least 4 to define a plane".into())?;
-        }
+        require((1..=MAX_LEVELS).contains(&self.surfels.levels), "levels", format!("must be 1 to {MAX_LEVELS}"))?;
+        require(self.surfels.min_points >= 4, "min_points", "must be at least 4 to define a plane".into())?;
         require(self.matching.neighbours >= 1, "neighbours", "must be at least 1".into())?;
         for (key, degrees) in [
             ("max_incidence_deg", self.surfels.max_incidence_deg),

@@ -1,15 +1,12 @@
 use serde::{Deserialize, Serialize};
 
-/// Loop closure by place recognition, for drift beyond the matching distance.
+/// Loop closure by place recognition, for drift beyond the matching distance: nodes of the length of a window are compared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(default)]
 pub struct PlacesSpec {
     /// Enables loop closure.
     pub recognised: bool,
-    /// Duration of a pose-graph node, s: its surfels are compared with those of other nodes.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub length_s: f64,
     /// Minimum time between two nodes of a loop closure, s.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub min_apart_s: f64,
@@ -35,9 +32,6 @@ pub struct PlacesSpec {
     /// Minimum fraction of the surfaces facing each direction that agree with the other node, 0..1.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub min_agreement: f64,
-    /// Maximum distance along the normal of surfaces that agree, m.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub max_plane_distance_m: f64,
     /// Minimum number of consistent loop closures; with fewer, none is applied.
     pub min_loops: usize,
 }

@@ -1,6 +1,6 @@
 use super::PlacesSpec;
+use super::surfel::{MAX_LEVELS, SurfelSpec};
 use crate::EstimationError;
-use crate::spec::{MatchingSpec, SurfelSpec};
 use serde::{Deserialize, Serialize};
 
 /// Global registration (loop-closed trajectory) settings.
@@ -11,17 +11,9 @@ pub struct RegistrationSpec {
     /// Spacing of the knots of the correction spline, s.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub knot_spacing_s: f64,
-    /// Edge of the finest voxels, m.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub finest_voxel_m: f64,
-    /// Number of resolutions; each has double the voxel edge of the previous one.
-    pub levels: usize,
-    /// Minimum number of points of a surfel.
+    /// Minimum number of points of a surfel. It may be a line: the normal of a match is that of both surfels together, and two
+    /// lines on one surface determine it.
     pub min_points: usize,
-    /// Minimum planarity of a surfel, 0 to 1. With 0 it may be a line: the normal of a match is that of both surfels
-    /// together, and two lines on one surface determine it.
-    #[serde(default, with = "zsim_base::spec::checked::Fraction")]
-    pub min_planarity: f64,
     /// Number of points from which on a surfel has its full weight; with fewer, its variance along the normal counts in
     /// inverse proportion to the number. 0: all have their full weight.
     #[serde(default)]
@@ -33,13 +25,9 @@ pub struct RegistrationSpec {
     /// Duration of a submap, s; surfels are matched between pairs of submaps.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub chapter_s: f64,
-    /// Number of reference submaps that must observe each cell; all submaps are matched with references. More references
-    /// give more matches and longer computing times.
+    /// Number of reference submaps that must observe each cell, and maximum number of references that a submap is
+    /// matched with. More references give more matches and longer computing times.
     pub references: usize,
-    /// Maximum number of references that a submap is matched with.
-    pub partners: usize,
-    /// Number of nearest neighbours of a surfel in each of them.
-    pub neighbours: usize,
     /// Maximum distance along the normal of a match at the finest resolution, m; while coarser resolutions are registered
     /// it is larger in proportion to the voxel edge.
     #[serde(with = "zsim_base::spec::checked::Positive")]
@@ -50,9 +38,6 @@ pub struct RegistrationSpec {
     /// Standard deviation of a match in addition to surfel thickness, m.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub match_sigma_m: f64,
-    /// Weight of all matches of a surfel together, relative to one independent match: errors of matches are correlated.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub match_weight: f64,
     /// Prior standard deviation of the range bias of an echo of median intensity, m; the bias is inversely proportional to the
     /// square of the intensity. 0 to estimate none.
     #[serde(with = "zsim_base::spec::checked::NonNegative")]
@@ -76,19 +61,10 @@ pub struct RegistrationSpec {
     /// Standard deviation of the open-loop roll and pitch relative to gravity, degrees.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub level_sigma_deg: f64,
-    /// Maximum number of iterations of match and solve per resolution.
-    pub max_iterations: usize,
-    /// Convergence threshold: iterations end when no knot moves by more than this, m.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub settled_m: f64,
     /// The geometry is weak if the smallest over the largest eigenvalue of the position information of the matches is below
     /// this, 0..1.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub weak_conditioning: f64,
-    /// Minimum time between the two surfels of a match that counts as a revisit, s; shorter ones are already used by the
-    /// windows of the open loop.
-    #[serde(with = "zsim_base::spec::checked::Positive")]
-    pub again_after_s: f64,
     /// Minimum fraction of the information along a weak direction due to revisits, 0..1; with less, the
     /// registration is rejected, because the IMU constrains that direction better in the open loop.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
@@ -103,21 +79,15 @@ fn usual_full_weight_points() -> usize {
 }
 
 impl RegistrationSpec {
-    /// Surfel settings of the registration; the others equal `open_loop`.
+    /// Surfel settings of the registration: a resolution more; the others equal `open_loop`.
     pub(crate) fn surfels(&self, open_loop: &SurfelSpec) -> SurfelSpec {
         SurfelSpec {
-            finest_voxel_m: self.finest_voxel_m,
-            levels: self.levels,
+            levels: (open_loop.levels + 1).min(MAX_LEVELS),
             min_points: self.min_points,
-            min_planarity: self.min_planarity,
+            min_planarity: 0.0,
             max_duration_s: self.max_duration_s,
             ..open_loop.clone()
         }
-    }
-
-    /// Matching settings of the registration; the others equal `open_loop`.
-    pub(crate) fn matching(&self, open_loop: &MatchingSpec) -> MatchingSpec {
-        MatchingSpec { max_plane_distance_m: self.max_plane_distance_m, ..open_loop.clone() }
     }
 
     /// Checks the ranges of the counts.
@@ -126,7 +96,6 @@ impl RegistrationSpec {
             let message = message.to_owned();
             if is_right { Ok(()) } else { Err(EstimationError::Setting { key, message }) }
         };
-        require((1..=6).contains(&self.levels), "registration.levels", "must be 1 to 6")?;
         require(
             self.min_points >= 4,
             "registration.min_points",
@@ -139,9 +108,6 @@ impl RegistrationSpec {
         )?;
         for (key, count) in [
             ("registration.references", self.references),
-            ("registration.partners", self.partners),
-            ("registration.neighbours", self.neighbours),
-            ("registration.max_iterations", self.max_iterations),
             ("registration.places.candidates", self.places.candidates),
             ("registration.places.tries", self.places.tries),
             ("registration.places.min_loops", self.places.min_loops),

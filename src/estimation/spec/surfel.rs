@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Maximum number of resolutions.
+pub(super) const MAX_LEVELS: usize = 6;
+
 /// Surfel extraction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -12,13 +15,12 @@ pub struct SurfelSpec {
     pub finest_voxel_m: f64,
     /// Number of resolutions, 1 to 6; each has voxels twice as large as the previous one.
     pub levels: usize,
-    /// Whether each resolution has a second grid, offset by half a voxel.
-    pub offset_grids: bool,
     /// Minimum number of points of a surfel, at least 4.
     pub min_points: usize,
-    /// Additional surfels where the geometry is weak.
-    #[serde(default)]
-    pub fine: FineSurfelSpec,
+    /// While the conditioning of the last windows is below this, surfels are also built of voxels of half the finest edge,
+    /// and all surfels of half the minimum number of points; 0 for never.
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
+    pub fine_below_conditioning: f64,
     /// The points of a voxel are split where consecutive times differ by more than this, s.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub split_gap_s: f64,
@@ -28,14 +30,12 @@ pub struct SurfelSpec {
     /// Minimum planarity `2 (l2 - l1) / (l1 + l2 + l3)`, 0..1 (Bosse and Zlot 2009).
     #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub min_planarity: f64,
-    /// Maximum thickness (standard deviation along the normal), as a multiple of the range noise.
+    /// Maximum thickness (standard deviation along the normal), as a multiple of the range noise. A surfel counts as flat if
+    /// its variance along the normal exceeds that of a plane with range noise by less than this multiple of the standard
+    /// deviation of the variance, which is `sqrt(2 / N)` of it for `N` points.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub max_thickness_sigmas: f64,
-    /// A surfel counts as flat if its variance along the normal exceeds that of a plane with range noise by less than
-    /// this multiple of the standard deviation of the variance, which is `sqrt(2 / N)` of it for `N` points.
-    #[serde(with = "zsim_base::spec::checked::NonNegative")]
-    pub flat_within_sigmas: f64,
-    /// Extra variance of the position of a surfel that is not flat, along the normal, as a multiple of that excess; 0
+    /// Extra variance of the position of a surfel that is not flat, along the normal, as a multiple of its excess; 0
     /// treats all surfels as flat.
     #[serde(with = "zsim_base::spec::checked::NonNegative")]
     pub excess_doubt: f64,
@@ -59,17 +59,11 @@ pub struct SurfelSpec {
     pub max_range_m: f64,
 }
 
-/// Additional surfels where the geometry is weak, as along a corridor or on stairs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(default)]
-pub struct FineSurfelSpec {
-    /// While the conditioning of the last windows is below this, surfels are also built of voxels of half the finest edge;
-    /// 0 for never.
-    #[serde(with = "zsim_base::spec::checked::Fraction")]
-    pub below_conditioning: f64,
-    /// Minimum number of points of all surfels there, at least 4.
-    pub min_points: usize,
+impl SurfelSpec {
+    /// Minimum number of points of a surfel while fine surfels are built, as along a corridor or on stairs.
+    pub(crate) fn fine_min_points(&self) -> usize {
+        (self.min_points / 2).max(4)
+    }
 }
 
 /// Surfel matching.
@@ -77,10 +71,8 @@ pub struct FineSurfelSpec {
 #[serde(deny_unknown_fields)]
 #[schemars(default)]
 pub struct MatchingSpec {
-    /// Number of nearest neighbours searched for each surfel, at least 1.
+    /// Number of nearest neighbours searched for each surfel, at least 1; each of a match must be one of the other.
     pub neighbours: usize,
-    /// Whether each surfel of a match must be among the neighbours of the other.
-    pub reciprocal: bool,
     /// Scale of the normal in the six-dimensional distance (position and normal), in voxel edges per unit.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub normal_scale: f64,

@@ -72,16 +72,15 @@ impl SurfelBuilder {
         let origin = motion_at(first.tau_s).position;
         let edge_m = self.spec.finest_voxel_m;
         let edges_m: &[f64] = if detail == Detail::Fine { &[edge_m, 0.5 * edge_m] } else { &[edge_m] };
-        let shifts = self.shifts();
         let points = self.project(returns, nominal, unknowns);
-        let fragments: Vec<Vec<Fragment>> = (0..edges_m.len() * shifts)
+        let fragments: Vec<Vec<Fragment>> = (0..edges_m.len() * 2)
             .into_par_iter()
             .map(|k| {
-                let (edge_m, shift) = (edges_m[k / shifts], 0.5 * (k % shifts) as f64);
+                let (edge_m, shift) = (edges_m[k / 2], 0.5 * (k % 2) as f64);
                 self.fragments(returns, &points, &origin, (edge_m, shift * edge_m))
             })
             .collect();
-        let min_points = if detail == Detail::Fine { self.spec.fine.min_points } else { self.spec.min_points };
+        let min_points = if detail == Detail::Fine { self.spec.fine_min_points() } else { self.spec.min_points };
         let surfels_of = |grid: &Grid| -> Vec<SurfelThickness> {
             let cells = merge_by_cell(grid, &self.spec, min_points);
             let fit = |cell| self.fit_surfel(cell, grid.level, &origin, &unknowns.lidar, motion_at);
@@ -91,28 +90,18 @@ impl SurfelBuilder {
         flatness::add_roughness_variance(shaped.concat(), &self.spec)
     }
 
-    /// Number of grids of an edge: the regular one, and with `offset_grids` the one that is offset by half a cell.
-    fn shifts(&self) -> usize {
-        if self.spec.offset_grids { 2 } else { 1 }
-    }
-
-    /// The grids of all resolutions, of the regular and, if there are any, offset fragments of the usual and, if there are any, the
-    /// fine voxels.
+    /// The grids of all resolutions, each regular and offset by half a cell; `fragments` has the regular and the offset ones of the
+    /// usual and, if there are any, the fine voxels.
     fn grids<'a>(&self, fragments: &'a [Vec<Fragment>]) -> Vec<Grid<'a>> {
-        let shifts = self.shifts();
         let usual = (0..self.spec.levels).map(|level| (0, level, level));
-        let fine = (1..fragments.len() / shifts).map(|edge| (edge, 0, FINE));
-        let mut grids = Vec::new();
-        for (edge, doublings, level) in usual.chain(fine) {
-            let of_edge = &fragments[edge * shifts..(edge + 1) * shifts];
-            grids.push(Grid { fragments: &of_edge[0], doublings, shift: 0, level });
-            if let [regular, offset] = of_edge {
-                // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
-                let (fragments, shift) = if doublings == 0 { (offset, 0) } else { (regular, 1 << (doublings - 1)) };
-                grids.push(Grid { fragments, doublings, shift, level });
-            }
-        }
-        grids
+        let fine = (1..fragments.len() / 2).map(|edge| (edge, 0, FINE));
+        let of_resolution = |(edge, doublings, level): (usize, usize, usize)| {
+            let (regular, offset) = (&fragments[2 * edge], &fragments[2 * edge + 1]);
+            // Half a coarse cell is an integer number of finest cells: the regular fragments serve both grids.
+            let (shifted, shift) = if doublings == 0 { (offset, 0) } else { (regular, 1 << (doublings - 1)) };
+            [(regular, 0), (shifted, shift)].map(|(fragments, shift)| Grid { fragments, doublings, shift, level })
+        };
+        usual.chain(fine).flat_map(of_resolution).collect()
     }
 
     /// The point of each return in the map, m.
@@ -273,7 +262,6 @@ fn merge_by_cell(grid: &Grid, spec: &SurfelSpec, min_points: usize) -> Vec<Momen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Formulation;
     use crate::clock::Clock;
     use crate::spec;
     use crate::strapdown::{Biases, Interval, State};
@@ -323,7 +311,7 @@ mod tests {
     }
 
     fn surfels(builder: &SurfelBuilder, nominal: &Nominal, returns: &[TimedReturn], detail: Detail) -> Vec<Surfel> {
-        let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0, formulation: Formulation::ImuTime };
+        let clock = Clock { offset_s: 0.0, rate: 0.0, at_s: 0.0 };
         let still = Biases { gyro: Vector::zeros(), accel: Vector::zeros() };
         builder.build(returns, nominal, &Unknowns::initial(still, clock), detail)
     }

@@ -1,7 +1,6 @@
 //! A surfel and the returns that it is built from.
 
 use super::super::nominal::Nominal;
-use super::super::spec::Formulation;
 use super::super::spline::Basis;
 use super::super::unknowns::Unknowns;
 use zsim_base::geometry::Matrix;
@@ -164,16 +163,12 @@ impl Surfel {
             points: self.points,
         };
         let range_m = ray_in_imu.norm();
-        let velocity = match clock.formulation {
-            Formulation::ImuTime => motion.velocity + motion.angular_velocity.cross(&arm),
-            Formulation::Paper => Vector::zeros(),
-        };
         PlacedSurfel {
             patch,
             tau_s: self.tau_s,
             arm,
             sighting: Sighting { beam: motion.rotation * ray_in_imu / range_m, range_m, map_from_imu: motion.rotation },
-            velocity,
+            velocity: motion.velocity + motion.angular_velocity.cross(&arm),
             basis: Basis::at(u_s, by.knot_spacing_s),
         }
     }

@@ -35,7 +35,10 @@ pub(super) fn add_roughness_variance(all: Vec<SurfelThickness>, spec: &SurfelSpe
     let usual = [false, true].map(|upright| usual_thickness(all.iter().filter(|shaped| shaped.is_upright == upright)));
     let add = |shaped: SurfelThickness| {
         let flat = usual[usize::from(shaped.is_upright)] * shaped.noise_variance;
-        Surfel { roughness_variance: spec.excess_doubt * shaped.excess(flat, spec.flat_within_sigmas), ..shaped.surfel }
+        Surfel {
+            roughness_variance: spec.excess_doubt * shaped.excess(flat, spec.max_thickness_sigmas),
+            ..shaped.surfel
+        }
     };
     all.into_iter().map(add).collect()
 }
@@ -87,7 +90,7 @@ mod tests {
 
     fn roughness_variances(all: impl Iterator<Item = SurfelThickness>) -> Vec<f64> {
         let shipped = spec::load("default").unwrap().surfels;
-        let spec = SurfelSpec { flat_within_sigmas: 2.0, excess_doubt: 7.0, ..shipped };
+        let spec = SurfelSpec { max_thickness_sigmas: 2.0, excess_doubt: 7.0, ..shipped };
         add_roughness_variance(all.collect(), &spec).iter().map(|surfel| surfel.roughness_variance).collect()
     }
 

@@ -7,8 +7,7 @@ use crate::displacement::Displacement;
 use crate::layout::Layout;
 use crate::nominal::Correction;
 use crate::residual::inertial::add_inertial;
-use crate::residual::{FastMotion, Nodes, paper, prior};
-use crate::spec::Formulation;
+use crate::residual::{FastMotion, Nodes, prior};
 use crate::spline::Basis;
 use crate::timing::{Stopwatch, Timing};
 use crate::unknowns::Unknowns;
@@ -29,10 +28,8 @@ impl Window {
         let first_knot = Basis::at(self.start.u_s, spacing).first;
         let last_knot = Basis::at(self.nominal.end_s(), spacing).first + 3;
         let layout = Layout { first_knot, knots: (last_knot - first_knot + 1) as usize };
-        if self.spec.formulation == Formulation::ImuTime {
-            let (states, intervals) = (&self.nominal.states()[first..], &self.nominal.intervals()[first..]);
-            *fast_motion = FastMotion::of(&Nodes { states, bases, intervals }, &layout);
-        }
+        let (states, intervals) = (&self.nominal.states()[first..], &self.nominal.intervals()[first..]);
+        *fast_motion = FastMotion::of(&Nodes { states, bases, intervals }, &layout);
         layout
     }
 
@@ -70,14 +67,8 @@ impl Window {
         equations.reset(layout.size());
         let states = self.nominal.states();
         let nodes = Nodes { states: &states[first..], bases, intervals: &self.nominal.intervals()[first..] };
-        let Unknowns { biases, gravity, clock, .. } = &self.unknowns;
-        match self.spec.formulation {
-            Formulation::ImuTime => add_inertial(equations, layout, &nodes, fast_motion, biases, gravity),
-            Formulation::Paper => {
-                let times_s: Vec<f64> = self.nominal.times_s()[first..].iter().map(|t| t - clock.at_s).collect();
-                paper::add_inertial(equations, layout, &nodes, &times_s, biases, gravity);
-            }
-        }
+        let Unknowns { biases, gravity, .. } = &self.unknowns;
+        add_inertial(equations, layout, &nodes, fast_motion, biases, gravity);
         self.start.add_to(equations, layout, total, self.border.total_step(), self.spec.knot_spacing_s);
         self.border.add_to(equations, layout);
         let nodes = self.nominal.times_s().iter().zip(states).skip(first);

@@ -32,24 +32,22 @@ impl Default for Workspace {
 /// Cauchy robust kernel.
 #[derive(Debug)]
 pub(super) struct Robust {
-    weight: f64,
     threshold: f64,
 }
 
 impl Robust {
     /// Creates the kernel of an iteration.
     ///
-    /// The threshold shrinks from `cauchy_start` to `cauchy_end`.
+    /// The threshold shrinks from twice `cauchy` to `cauchy`.
     pub fn of(spec: &SolveSpec, iteration: usize) -> Self {
         let late = (iteration as f64 / (spec.max_iterations as f64 - 1.0).max(1.0)).min(1.0);
-        let threshold = spec.cauchy_start + (spec.cauchy_end - spec.cauchy_start) * late;
-        Self { weight: spec.match_weight, threshold }
+        Self { threshold: spec.cauchy * (2.0 - late) }
     }
 
     /// Returns the weight of a match with residual `residual_m`.
     pub fn weight(&self, plane: &Plane, residual_m: f64) -> f64 {
         let normalised2 = residual_m * residual_m / plane.variance;
-        self.weight / (plane.variance * (1.0 + normalised2 / (self.threshold * self.threshold)))
+        1.0 / (plane.variance * (1.0 + normalised2 / (self.threshold * self.threshold)))
     }
 }
 

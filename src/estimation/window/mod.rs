@@ -5,7 +5,6 @@ mod correspondence;
 mod equations;
 mod linearised;
 mod local_motion;
-mod readings;
 mod rests;
 mod search;
 mod solve;
@@ -34,7 +33,6 @@ use super::unknowns::Unknowns;
 use super::views::{SeenPatch, SeenSegment};
 use correspondence::CachedNeighbours;
 use equations::Workspace;
-use readings::Readings;
 use rests::Rests;
 use std::collections::VecDeque;
 use zsim_base::geometry::{Matrix, Pose, Rotation, Vector};
@@ -85,7 +83,6 @@ pub(super) struct Window {
     observed_builder: Option<SurfelBuilder>,
     matcher: Matcher,
     pub(super) nominal: Nominal,
-    readings: Readings,
     pub(super) unknowns: Unknowns,
     border: Border,
     segments: VecDeque<WindowSegment>,
@@ -110,16 +107,15 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// A window that starts with the first IMU interval, at `start_u_s`, IMU time, s.
+    /// A window that starts with the first IMU interval, at `start_s`, IMU time, s.
     pub(super) fn new(
         spec: &EstimatorSpec,
         builder: SurfelBuilder,
         initial_state: &InitialState,
-        start_u_s: f64,
+        start_s: f64,
         clock: Clock,
         border: Border,
     ) -> Self {
-        let start_s = clock.trajectory_from_imu_s(start_u_s);
         Self {
             spec: spec.clone(),
             matcher: Matcher::new(&spec.matching, &spec.surfels),
@@ -127,7 +123,6 @@ impl Window {
             fine_until_s: f64::NEG_INFINITY,
             observed_builder: None,
             nominal: Nominal::starting(start_s, initial_state.state),
-            readings: Readings::of(spec.formulation),
             unknowns: Unknowns::initial(initial_state.biases, clock),
             border,
             segments: VecDeque::new(),
@@ -273,17 +268,13 @@ impl Window {
     ) -> Timing {
         let mut watch = Stopwatch::start();
         let unobserved = self.motion_unobserved_in(&returns, intervals);
-        self.readings.forget_before(&self.nominal, &self.unknowns.clock);
-        for (start_s, interval) in intervals {
-            let Some(interval) = self.readings.next(*start_s, interval, &self.nominal, &self.unknowns.clock) else {
-                continue;
-            };
+        for (_, interval) in intervals {
             let Unknowns { biases, gravity, scale_misalignment, .. } = &self.unknowns;
             self.nominal.extend(interval.corrected_by(scale_misalignment), biases, gravity);
-            self.rest = self.rest.filter(|rest| rest.agrees_with(&interval));
+            self.rest = self.rest.filter(|rest| rest.agrees_with(interval));
             if self.speed_is_known {
                 let speed_m_per_s = (unobserved * self.velocity_in_imu()).norm();
-                self.rests.take(&interval, &self.unknowns.biases, self.nominal.end_s(), speed_m_per_s);
+                self.rests.take(interval, &self.unknowns.biases, self.nominal.end_s(), speed_m_per_s);
             }
             if self.rest.is_some() {
                 self.rested_until_s = self.nominal.end_s() - REST_MARGIN_S;

@@ -9,6 +9,7 @@ use crate::nominal::Correction;
 use crate::residual::matched::MIN_SIGNIFICANT_TILT;
 use crate::surfel::{FINE, PlacedSurfel};
 use crate::timing::{Stopwatch, Timing};
+use crate::unknowns::scale_misalignment_step;
 use crate::views::Views;
 use zsim_base::geometry::{Matrix, Vector};
 
@@ -117,7 +118,7 @@ impl Window {
 
     /// Builds fine surfels for the next window's time if the geometry of this one is weak.
     fn choose_detail(&mut self, solved: &WindowSolution) {
-        let is_weak = solved.conditioning < self.spec.surfels.fine.below_conditioning;
+        let is_weak = solved.conditioning < self.spec.surfels.fine_below_conditioning;
         // At the start the geometry is weak because the head hardly sweeps yet; small surfels are then lines.
         let is_swept = self.rested_until_s <= self.start.u_s && !self.wide_matching;
         if is_weak && is_swept && solved.matches + solved.view_matches >= self.spec.solve.min_matches {
@@ -155,7 +156,7 @@ impl Window {
             *sum += term;
         }
         self.unknowns = self.unknowns.plus(border);
-        self.readings.update(&mut self.nominal, &self.unknowns, border);
+        self.nominal.correct_readings(&scale_misalignment_step(border));
         self.border.add_step(border, &self.workspace.factor);
     }
 }

@@ -53,7 +53,7 @@ impl Window {
             pivot: self.nominal.at(u_s, &self.unknowns.biases.gyro).position,
             start,
             views: by_views.iter().map(|(number, c)| (*number, SMatrix::from_fn(|r, k| by(r, &c[k])))).collect(),
-            noise: own * self.spec.solve.covariance_inflation + self.border.imu_random_walk(self.spec.step_s),
+            noise: own + self.border.imu_random_walk(self.spec.step_s),
         })
     }
 

@@ -41,7 +41,7 @@ fn all_levels(edge_m: f64, at: f64) -> Vec<Patch> {
 fn relocaliser(patches: &[Patch]) -> Relocaliser {
     let spec = crate::load("default").unwrap();
     let map = SurfelMap::new(0.4, 3, patches.iter().map(|patch| patch.to_map_surfel(0.002)).collect()).unwrap();
-    let solve = SolveSpec { match_sigma_m: 0.01, covariance_inflation: 7.0, ..spec.solve };
+    let solve = SolveSpec { match_sigma_m: 0.01, ..spec.solve };
     Relocaliser::new(&map, &spec.matching, &spec.surfels, &solve)
 }
 

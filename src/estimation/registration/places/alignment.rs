@@ -143,20 +143,14 @@ fn step(
 ///
 /// The directions are the vertical and the horizontal principal axes of the normals. The minimum is used because in a corridor
 /// floor and walls match at any position along it. `None` if too few surfaces face one of the directions.
-pub(super) fn agreement(
-    from: &NodeSurfels,
-    to: &NodeSurfels,
-    alignment: &Alignment,
-    matcher: &Matcher,
-    gate_m: f64,
-) -> Option<f64> {
+pub(super) fn agreement(from: &NodeSurfels, to: &NodeSurfels, alignment: &Alignment, matcher: &Matcher) -> Option<f64> {
     let queries = from.queries.get(COMPARED_LEVEL.min(from.queries.len().saturating_sub(1)))?;
     let turn = alignment.turn();
     let directions = directions(queries);
     let mut facing = [(0_usize, 0_usize); 3];
     for patch in queries {
         let Some(k) = directions.iter().position(|d| patch.normal.dot(d).abs() > FACING_COSINE) else { continue };
-        let agrees = to.counterpart(&alignment.moved(patch, &turn), matcher, gate_m).is_some();
+        let agrees = to.counterpart(&alignment.moved(patch, &turn), matcher, matcher.max_plane_distance_m()).is_some();
         facing[k] = (facing[k].0 + usize::from(agrees), facing[k].1 + 1);
     }
     let fraction = |(agreeing, all): &(usize, usize)| (*all >= MIN_FACING).then(|| *agreeing as f64 / *all as f64);

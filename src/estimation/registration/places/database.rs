@@ -1,6 +1,5 @@
 //! Divides the recording into nodes, submaps for place recognition.
 
-use crate::PlacesSpec;
 use crate::observed::ObservedSurfels;
 use crate::registration::corrected_trajectory::CorrectedTrajectory;
 use crate::registration::submaps::divide;
@@ -31,12 +30,14 @@ pub(super) struct PlaceDatabase<'a> {
     observed: &'a ObservedSurfels,
     /// Indices of the observed surfels in time order.
     order: Vec<u32>,
+    /// Duration of a node, s.
+    pub(super) length_s: f64,
     pub(super) nodes: Vec<Node>,
 }
 
 impl<'a> PlaceDatabase<'a> {
-    /// Divides the surfels of `observed` within the time of `corrected`.
-    pub(super) fn new(observed: &'a ObservedSurfels, corrected: &CorrectedTrajectory, spec: &PlacesSpec) -> Self {
+    /// Divides the surfels of `observed` within the time of `corrected` into nodes of `length_s`.
+    pub(super) fn new(observed: &'a ObservedSurfels, corrected: &CorrectedTrajectory, length_s: f64) -> Self {
         let (start_s, end_s) = corrected.span_s();
         let tau_s = |k: &u32| observed.surfels[*k as usize].tau_s;
         let mut order: Vec<u32> =
@@ -56,8 +57,8 @@ impl<'a> PlaceDatabase<'a> {
             let ground_m = heights.get((heights.len() as f64 * GROUND_QUANTILE) as usize).copied().unwrap_or(0.0);
             Node { tau_s, head, ground_m, members }
         };
-        let nodes = divide(&times_s, spec.length_s).into_iter().map(node).collect();
-        Self { observed, order, nodes }
+        let nodes = divide(&times_s, length_s).into_iter().map(node).collect();
+        Self { observed, order, length_s, nodes }
     }
 
     /// Surfels of `level` of a node, relative to the head, in map axes.

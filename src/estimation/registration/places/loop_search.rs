@@ -75,7 +75,7 @@ impl LoopSearch<'_> {
         let context = |node: usize| Context::from_patches(self.database.patches(node, 0), nodes[node].ground_m);
         let contexts: Vec<Context> = (0..nodes.len()).into_par_iter().map(context).collect();
         // Neighbours in time are similar, too, and excluded below: request as many more.
-        let in_time = 2 * (self.spec.min_apart_s / self.spec.length_s).ceil() as usize;
+        let in_time = 2 * (self.spec.min_apart_s / self.database.length_s).ceil() as usize;
         let near = scan_context::nearest_by_key(&contexts, self.spec.candidates + in_time);
         let of_node = |late: usize| {
             let to_candidate = |early: &usize| {
@@ -192,6 +192,6 @@ impl LoopSearch<'_> {
     }
 
     fn agreement(&self, late: &NodeSurfels, early: &NodeSurfels, alignment: &Alignment) -> Option<f64> {
-        agreement(late, early, alignment, self.matcher, self.spec.max_plane_distance_m)
+        agreement(late, early, alignment, self.matcher)
     }
 }

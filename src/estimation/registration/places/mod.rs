@@ -26,9 +26,9 @@ pub(super) use relative_pose::RelativePose;
 
 use super::corrected_trajectory::CorrectedTrajectory;
 use super::trajectory_difference::largest_difference;
-use crate::RegistrationSpec;
 use crate::matching::Matcher;
 use crate::observed::ObservedSurfels;
+use crate::{EstimatorSpec, RegistrationSpec};
 use database::PlaceDatabase;
 use loop_search::{LoopFilter, LoopSearch};
 use pose_graph::optimise;
@@ -58,13 +58,13 @@ pub(super) fn close_loops(
     observed: &ObservedSurfels,
     corrected: &CorrectedTrajectory,
     matcher: &Matcher,
-    spec: &RegistrationSpec,
+    spec: &EstimatorSpec,
 ) -> (LoopReport, Option<PreAligned>) {
-    if !spec.places.recognised {
+    let (nodes, length_s, spec) = (&spec.registration.places, spec.window_s, &spec.registration);
+    if !nodes.recognised {
         return (LoopReport::default(), None);
     }
-    let nodes = &spec.places;
-    let search = LoopSearch { database: PlaceDatabase::new(observed, corrected, nodes), matcher, spec: nodes };
+    let search = LoopSearch { database: PlaceDatabase::new(observed, corrected, length_s), matcher, spec: nodes };
     let (loops, report) = search.loops(LoopFilter::OutOfReach);
     if loops.len() < nodes.min_loops {
         return (report, None);
@@ -78,7 +78,7 @@ pub(super) fn close_loops(
             break;
         };
         let mut corrected = corrected.with_gravity_from(map_from_head, &trajectory);
-        let search = LoopSearch { database: PlaceDatabase::new(&observed, &corrected, nodes), matcher, spec: nodes };
+        let search = LoopSearch { database: PlaceDatabase::new(&observed, &corrected, length_s), matcher, spec: nodes };
         let ((loops, _), links) = (search.loops(LoopFilter::All), search.links());
         let level_sigma_rad = spec.level_sigma_deg.to_radians();
         let mut with_loops = corrected.clone();
