@@ -62,13 +62,18 @@ impl From<&PlacedSurfel> for SeenPatch {
 }
 
 impl View {
-    /// The patch at `index` as the correction `lidar` places it, and how the lidar saw it.
-    pub(super) fn patch(&self, index: u32, lidar: &LidarCorrection) -> (Patch, Option<Sighting>) {
-        let index = index as usize;
-        let patch = self.patches[index];
-        let Some(sighting) = self.sightings.get(index) else { return (patch, None) };
-        let by = self.placed_by.partition_point(|(_, until)| *until <= index);
-        (sighting.recalibrated(&patch, &self.placed_by[by].0, lidar), Some(*sighting))
+    /// The patch at `index` as the correction `lidar` places it.
+    pub(super) fn patch(&self, index: u32, lidar: &LidarCorrection) -> Patch {
+        let patch = self.patches[index as usize];
+        let Some(sighting) = self.sighting(index) else { return patch };
+        let by = self.placed_by.partition_point(|(_, until)| *until <= index as usize);
+        sighting.recalibrated(&patch, &self.placed_by[by].0, lidar)
+    }
+
+    /// How the lidar saw the patch at `index`; `None` for a patch of a given map.
+    #[inline]
+    pub(super) fn sighting(&self, index: u32) -> Option<&Sighting> {
+        self.sightings.get(index as usize)
     }
 }
 
@@ -281,12 +286,12 @@ mod tests {
         let now = lidar(0.007, -2e-3, 1e-3);
         let expected = wall(&now).patch;
         for index in [0, 1] {
-            let (patch, sighting) = views.view(1).patch(index, &now);
-            assert!(sighting.is_some());
+            let patch = views.view(1).patch(index, &now);
+            assert!(views.view(1).sighting(index).is_some());
             // Terms of second order: 3 mrad times 9 mm, and half of 3 mrad squared times 3 m.
             assert!((patch.centre - expected.centre).norm() < 5e-5, "{patch:?}");
             assert!((patch.normal - expected.normal).norm() < 1e-5, "{patch:?}");
         }
-        assert_eq!(views.view(0).patch(0, &now), (map, None));
+        assert_eq!((views.view(0).patch(0, &now), views.view(0).sighting(0)), (map, None));
     }
 }

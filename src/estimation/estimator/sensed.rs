@@ -1,6 +1,7 @@
 //! The motion that the sensors measured, without the influence of fixed views: input of the registration.
 
 use crate::observed::{MotionByViews, ObservedSurfels};
+use crate::views::Views;
 use crate::window::{Linearised, LocalMotion, Window};
 use std::collections::VecDeque;
 use zsim_base::geometry::Pose;
@@ -32,13 +33,14 @@ impl SensedMotion {
         &mut self,
         window: &mut Window,
         at: &Linearised,
+        views: &Views,
         final_s: f64,
         observed: &mut ObservedSurfels,
     ) {
         let from_s = self.until_s.unwrap_or(f64::NEG_INFINITY).max(window.start_s());
         let until_s = final_s + MIDDLE * (window.nominal.end_s() - final_s);
         if until_s > from_s {
-            let motion = window.motion_without_views(from_s, until_s, at);
+            let motion = window.motion_without_views(from_s, until_s, at, views);
             self.pending.extend(motion.map(|motion| PendingMotion { from_s, until_s, motion, start: None }));
             self.until_s = Some(until_s);
         }

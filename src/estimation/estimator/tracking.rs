@@ -79,7 +79,7 @@ impl Estimator {
         }
         let tau_s = window.unknowns.clock.lidar_s(until_s);
         if let (Some(observed), Some(at)) = (&mut self.observed, linearised) {
-            sensed.advance(window, at, until_s, observed);
+            sensed.advance(window, at, &local_map.views, until_s, observed);
         }
         self.gauge.advance(&mut local_map.consider, until_s, self.intake.stamp(tau_s));
         let segment = window.remove_oldest(linearised)?;

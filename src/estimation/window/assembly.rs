@@ -11,6 +11,7 @@ use crate::residual::{FastMotion, Nodes, prior};
 use crate::spline::Basis;
 use crate::timing::{Stopwatch, Timing};
 use crate::unknowns::Unknowns;
+use crate::views::Views;
 
 /// Standard deviation of the zero-velocity measurement at rest, m/s.
 const REST_VELOCITY_SIGMA: f64 = 0.003;
@@ -41,12 +42,13 @@ impl Window {
         first: usize,
         total: &[f64],
         at: &Linearised,
+        views: &Views,
         timing: &mut Timing,
     ) -> Option<(Vec<f64>, Displacement)> {
         let mut watch = Stopwatch::start();
         let Linearised { layout, scene, matches, robust, .. } = at;
         let (clock_reference_s, extrinsics) = (self.unknowns.clock.at_s, self.spec.extrinsics.estimated);
-        let weighted = WeightedMatches { scene, matches, robust, clock_reference_s, sign: 1.0 };
+        let weighted = WeightedMatches { scene, matches, views, robust, clock_reference_s, sign: 1.0 };
         let ((), sums) = rayon::join(|| self.assemble_inertial(first, layout, total), || weighted.sums(extrinsics));
         sums.add_to(&mut self.workspace.equations, layout);
         timing.equations_s += watch.lap_s();

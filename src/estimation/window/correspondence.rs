@@ -2,7 +2,7 @@
 
 use crate::matching::Matcher;
 use crate::residual::matched::Plane;
-use crate::surfel::{Patch, PlacedSurfel, Sighting};
+use crate::surfel::{Patch, PlacedSurfel};
 use crate::views::Views;
 use rayon::prelude::*;
 use zsim_base::geometry::Vector;
@@ -49,8 +49,8 @@ pub(super) struct Match {
 pub(super) enum Counterpart {
     /// Another surfel of the window: an index into the scene.
     Live(u32),
-    /// A patch of a fixed view; without `sighting`, it does not depend on the lidar's calibration.
-    Fixed { view: u32, patch: u32, sighting: Option<Sighting> },
+    /// A patch of a fixed view: indices of both.
+    Fixed { view: u32, patch: u32 },
 }
 
 /// The matches of an iteration.

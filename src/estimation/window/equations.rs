@@ -9,6 +9,7 @@ use crate::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::spec::SolveSpec;
 use crate::spline::Basis;
 use crate::surfel::PlacedSurfel;
+use crate::views::Views;
 use pulp::Arch;
 use rayon::prelude::*;
 
@@ -18,7 +19,7 @@ pub(super) struct Workspace {
     pub equations: NormalEquations,
     pub factor: Factor,
     pub bases: Vec<Basis>,
-    /// By the IMU's scale errors and misalignments; empty if the trajectory is in lidar time.
+    /// By the IMU's scale errors and misalignments.
     pub fast_motion: FastMotion,
 }
 
@@ -55,6 +56,8 @@ impl Robust {
 pub(super) struct WeightedMatches<'a> {
     pub scene: &'a [PlacedSurfel],
     pub matches: &'a Matches,
+    /// The views of which the matches have indices.
+    pub views: &'a Views,
     pub robust: &'a Robust,
     pub clock_reference_s: f64,
     /// 1 to add the matches, -1 to remove them.
@@ -162,9 +165,8 @@ impl WeightedMatches<'_> {
         let normal = if first { one.plane.normal } else { -one.plane.normal };
         let surfel = if first { one.a as usize } else { one.other().unwrap_or(one.a as usize) };
         let side = SurfelJacobian::of(&self.scene[surfel], &normal, self.clock_reference_s);
-        match &one.with {
-            Counterpart::Fixed { sighting: Some(sighting), .. } => side.against_fixed(&normal, sighting),
-            Counterpart::Fixed { sighting: None, .. } | Counterpart::Live(_) => side,
-        }
+        let Counterpart::Fixed { view, patch } = one.with else { return side };
+        let sighting = self.views.view(view as usize).sighting(patch);
+        sighting.map_or(side, |sighting| side.against_fixed(&normal, sighting))
     }
 }

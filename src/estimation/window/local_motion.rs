@@ -12,6 +12,7 @@ use crate::layout::Layout;
 use crate::nominal::Correction;
 use crate::normal_equations::Factor;
 use crate::spline::Basis;
+use crate::views::Views;
 use nalgebra::Matrix6;
 use zsim_base::geometry::{Pose, Rotation, skew};
 
@@ -30,14 +31,20 @@ impl Window {
     /// The motion from `from_s` to `until_s`, trajectory time, without the views.
     ///
     /// `None` if the equations without them are singular. Changes the equations of the workspace.
-    pub(crate) fn motion_without_views(&mut self, from_s: f64, until_s: f64, at: &Linearised) -> Option<LocalMotion> {
+    pub(crate) fn motion_without_views(
+        &mut self,
+        from_s: f64,
+        until_s: f64,
+        at: &Linearised,
+        views: &Views,
+    ) -> Option<LocalMotion> {
         let is_fixed = |one: &&Match| matches!(one.with, Counterpart::Fixed { .. });
         let fixed: Vec<_> = at.matches.all.iter().filter(is_fixed).copied().collect();
         let matches = Matches::of(fixed, &at.scene);
         let clock_reference_s = self.unknowns.clock.at_s;
-        let views =
-            WeightedMatches { scene: &at.scene, matches: &matches, robust: &at.robust, clock_reference_s, sign: -1.0 };
-        views.sums(self.spec.extrinsics.estimated).add_to(&mut self.workspace.equations, &at.layout);
+        let (scene, robust) = (&at.scene, &at.robust);
+        let weighted = WeightedMatches { scene, matches: &matches, views, robust, clock_reference_s, sign: -1.0 };
+        weighted.sums(self.spec.extrinsics.estimated).add_to(&mut self.workspace.equations, &at.layout);
         let (total, moved) = (&at.total_before, self.border.total_step());
         let equations = &mut self.workspace.equations;
         self.start.remove_velocity(equations, &at.layout, total, moved, self.spec.knot_spacing_s);

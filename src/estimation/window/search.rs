@@ -67,8 +67,8 @@ impl Window {
         let fixed = |candidates: &[(u32, u32, u32)]| {
             let mut found = Vec::new();
             for (a, view, patch) in candidates {
-                let (other, sighting) = views.view(*view as usize).patch(*patch, &self.unknowns.lidar);
-                let with = Counterpart::Fixed { view: *view, patch: *patch, sighting };
+                let other = views.view(*view as usize).patch(*patch, &self.unknowns.lidar);
+                let with = Counterpart::Fixed { view: *view, patch: *patch };
                 found.extend(plane(*a, &other).map(|plane| Match { a: *a, with, plane }));
             }
             found
@@ -92,9 +92,7 @@ impl Window {
         for Match { a, with, plane } in &mut matches.all {
             let other = match *with {
                 Counterpart::Live(b) => scene[b as usize].patch,
-                Counterpart::Fixed { view, patch, .. } => {
-                    views.view(view as usize).patch(patch, &self.unknowns.lidar).0
-                }
+                Counterpart::Fixed { view, patch } => views.view(view as usize).patch(patch, &self.unknowns.lidar),
             };
             let variance =
                 scene[*a as usize].patch.normal_tilt_variance(direction) + other.normal_tilt_variance(direction);

@@ -78,7 +78,7 @@ impl Window {
             solved.timing.matches_s += watch.lap_s();
             let total_before = total.clone();
             let at = Linearised { layout, scene, matches, robust, total_before, step: Vec::new() };
-            let Some((x, by)) = self.solve_linearised(first, &total, &at, &mut solved.timing) else {
+            let Some((x, by)) = self.solve_linearised(first, &total, &at, views, &mut solved.timing) else {
                 solved.failure = Some("the normal equations are singular");
                 break;
             };

@@ -127,20 +127,20 @@ impl Window {
     fn columns_of_views(&self, at: &Linearised, views: &Views) -> Vec<ViewColumns> {
         let mut columns: Vec<(u32, [Vec<f64>; 6])> = Vec::new();
         for Match { a, with, plane } in &at.matches.all {
-            let Counterpart::Fixed { view: index, sighting, .. } = *with else { continue };
+            let Counterpart::Fixed { view: index, patch } = *with else { continue };
             let found = columns.iter().position(|(other, _)| *other == index);
             let index_in_columns = found.unwrap_or_else(|| {
                 columns.push((index, std::array::from_fn(|_| vec![0.0; at.layout.size()])));
                 columns.len() - 1
             });
-            let surfel = &at.scene[*a as usize];
-            let lever = surfel.patch.centre - views.view(index as usize).pivot;
+            let (surfel, view) = (&at.scene[*a as usize], views.view(index as usize));
+            let lever = surfel.patch.centre - view.pivot;
             let weight = at.robust.weight(plane, plane.distance_m);
             let turn: Vector = lever.cross(&plane.normal) * weight;
             let shift = plane.normal * weight;
             let by = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
             let side = SurfelJacobian::of(surfel, &plane.normal, self.unknowns.clock.at_s);
-            let side = sighting.map_or(side, |sighting| side.against_fixed(&plane.normal, &sighting));
+            let side = view.sighting(patch).map_or(side, |sighting| side.against_fixed(&plane.normal, sighting));
             matched::add_scaled_row(&mut columns[index_in_columns].1, &at.layout, &side, &surfel.basis, &by);
         }
         columns.into_iter().map(|(index, columns)| (views.view(index as usize).number, columns)).collect()
