@@ -98,7 +98,9 @@ impl<T: Send + Sync> CloudFilter<T> {
         }
         let hits: Vec<ProjectedReturn> = scan.iter().map(|(hit, _)| *hit).collect();
         let mixed = mixed::find_mixed(&hits, &self.noise);
-        let (_, returns) = self.filling.get_or_insert_with(|| (stamp, Vec::new()));
+        // As many as in the block before, and some more.
+        let expected = self.complete.back().map_or(0, |before| before.returns.len() * 9 / 8);
+        let (_, returns) = self.filling.get_or_insert_with(|| (stamp, Vec::with_capacity(expected)));
         returns.extend(scan.into_iter().zip(mixed).map(|((hit, payload), mixed)| PendingReturn {
             hit,
             mixed,

@@ -147,7 +147,8 @@ impl SurfelBuilder {
         (edge_m, shift_m): (f64, f64),
     ) -> Vec<Fragment> {
         let per_edge = 1.0 / edge_m;
-        let mut fragments: Vec<Fragment> = Vec::new();
+        // Room for the most there can be: growing would copy them several times.
+        let mut fragments: Vec<Fragment> = Vec::with_capacity(returns.len());
         for (beam, point) in returns.iter().zip(points) {
             let noise2 = self.noise.sigma_m(f64::from(beam.range_m)).powi(2);
             let cell = [point.x, point.y, point.z].map(|x| ((x + shift_m) * per_edge).floor() as i32);
@@ -234,7 +235,7 @@ fn merge_by_cell(grid: &Grid, spec: &SurfelSpec, min_points: usize) -> Vec<Momen
     let keyed = grid.fragments.iter().enumerate().map(|(k, f)| (cell_key(&f.cell, grid), k as u32));
     let mut keyed: Vec<(u64, u32)> = keyed.collect();
     keyed.sort_unstable();
-    let mut groups: Vec<Moments> = Vec::new();
+    let mut groups: Vec<Moments> = Vec::with_capacity(keyed.len());
     let mut open: Option<(u64, f64, f64, Moments)> = None;
     for (cell, k) in keyed {
         let fragment = &grid.fragments[k as usize];
