@@ -13,7 +13,7 @@ use zsim_base::spec::Kind;
 /// `zsim estimate` leaves a map, map.ply: surfels with their uncertainty. Another recording is localised in it with
 /// `zsim estimate --map`, and extended with --extend-map.
 #[derive(Args)]
-#[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
+#[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --out both.ply")]
 pub(super) struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -26,9 +26,9 @@ enum Command {
 
 /// Merge two maps by their common surfaces
 ///
-/// The second map is searched for in the first within a metre and twenty degrees of the given origin.
+/// The second map is searched for in the first: everywhere, or within a metre and twenty degrees of a given pose.
 #[derive(Args)]
-#[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --start 4.2,0.5,0,90 --out both.ply")]
+#[command(after_help = "Example:\n  zsim map merge monday/map.ply tuesday/map.ply --out both.ply")]
 struct MergeArguments {
     /// The map that defines the frame
     #[arg(value_name = "A.ply")]
@@ -37,8 +37,9 @@ struct MergeArguments {
     #[arg(value_name = "B.ply")]
     second: PathBuf,
     /// Approximate pose of the second map's origin in the first map: metres, and degrees about the vertical
-    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, default_value = "0,0,0,0", allow_hyphen_values = true)]
-    start: Pose,
+    /// [default: the whole first map is searched]
+    #[arg(long, value_name = "X,Y,Z,YAW", value_parser = start, allow_hyphen_values = true)]
+    start: Option<Pose>,
     /// The estimator's settings, a name under specs/estimators/ or a file
     #[arg(long, value_name = "NAME|FILE", default_value = "default")]
     estimator: String,
@@ -58,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let estimator_file = spec_file(Kind::Estimator, &merge.estimator);
     let inputs: Vec<PathBuf> = [merge.first.clone(), merge.second.clone()].into_iter().chain(estimator_file).collect();
     output::check_not_inputs(&inputs, std::slice::from_ref(out))?;
-    let merged = zsim_run::merge_map_files(&merge.first, &merge.second, &merge.start, &estimator, out)?;
+    let merged = zsim_run::merge_map_files(&merge.first, &merge.second, merge.start.as_ref(), &estimator, out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
     let (position, yaw_deg) = (at.translation.vector, roll_pitch_yaw(&at.rotation).2.to_degrees());

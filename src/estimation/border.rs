@@ -1,5 +1,6 @@
 //! Prior on the border unknowns (biases, gravity, clock, calibration), carried from window to window.
 
+use super::clock::RATE_WALK_PER_SQRT_S;
 use super::consider::{IMU_OFFSET, IMU_STATES, StartMatrix};
 use super::normal_equations::{Factor, NormalEquations};
 use super::residual::prior::add_border;
@@ -9,8 +10,6 @@ use zsim_base::measurement::ImuNoise;
 
 /// Random walk of the clock offset in addition to the rate, s per square root of a second.
 const CLOCK_WALK_S_PER_SQRT_S: f64 = 5e-6;
-/// Random walk of the clock rate, 1 per square root of a second.
-const CLOCK_RATE_WALK_PER_SQRT_S: f64 = 2e-7;
 
 /// Fraction of the information of a window that counts as independent: match errors are correlated, in the window and
 /// with those of the next windows.
@@ -43,7 +42,7 @@ impl Border {
         random_walks[GRAVITY..GRAVITY + 2].fill(1e-6);
         if clock_wanders {
             random_walks[CLOCK] = CLOCK_WALK_S_PER_SQRT_S;
-            random_walks[CLOCK_RATE] = CLOCK_RATE_WALK_PER_SQRT_S;
+            random_walks[CLOCK_RATE] = RATE_WALK_PER_SQRT_S;
         }
         Self { prior, to_mean: SVector::zeros(), posterior: None, step: SVector::zeros(), random_walks }
     }

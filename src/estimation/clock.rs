@@ -2,6 +2,9 @@
 
 use super::spec::EstimatorSpec;
 
+/// Random walk of the rate of a clock offset, 1/sqrt(s): 0.2 ppm, a quartz at room temperature.
+pub(super) const RATE_WALK_PER_SQRT_S: f64 = 2e-7;
+
 /// Maximum time over which the clock drift is extrapolated, s.
 ///
 /// A longer gap is a clock that was set, or a pause in which it may have been set. A rate error of 20 ppm would cause an

@@ -20,8 +20,6 @@ const MOTION_THRESHOLD: (f64, usize) = (0.12, 20);
 const MIN_STAYING: f64 = 0.3;
 /// Part of the weight of the changes that errors of the normals cause in a direction without surfaces.
 const NEGLIGIBLE: f64 = 0.01;
-/// Nearer surfaces are the operator or the mount, which move with the head, m.
-const OWN_BODY_M: f64 = 0.7;
 /// The head moves if its translation exceeds this, m.
 const SHIFTED_M: f64 = 0.03;
 /// Cauchy threshold of the residuals in successive solutions, m. Outliers are edges and moving objects.
@@ -112,7 +110,7 @@ fn compare(early: &[TimedReturn], late: &[TimedReturn]) -> Standstill {
 /// Whether surfaces stay in all directions in which others change, so that only these move.
 fn stays(both: &[(&Cell, f64)]) -> bool {
     let (mut stay, mut change) = (Matrix::zeros(), Matrix::zeros());
-    for (cell, late_m) in both.iter().filter(|(cell, _)| cell.mean_range_m() > OWN_BODY_M) {
+    for (cell, late_m) in both {
         let displacement_m = cell.mean_range_m() - late_m;
         match cell.facing() {
             Some((direction, normal)) if (displacement_m * normal.dot(&direction)).abs() < RANGE_TOLERANCE.0 => {

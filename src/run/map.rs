@@ -22,14 +22,14 @@ pub struct MergedMap {
 
 /// Merges the maps `first` and `second` in the frame of the first, and writes the result to `out`.
 ///
-/// `start` is the approximate pose of the second map in the first.
+/// `start` is the approximate pose of the second map in the first; without it the whole first map is searched.
 ///
 /// # Errors
 /// When a map cannot be read, the maps cannot be registered, or the file cannot be written.
 pub fn merge_map_files(
     first: &Path,
     second: &Path,
-    start: &Pose,
+    start: Option<&Pose>,
     estimator: &EstimatorSpec,
     out: &Path,
 ) -> Result<MergedMap, RunError> {

@@ -96,9 +96,9 @@ fn keys_that_are_omitted_have_the_values_of_the_shipped_specs() {
     assert_eq!(parsed::<ClocksSpec>("mine.ron", "()"), shipped("exact"));
     assert_eq!(parsed::<EstimatorSpec>("mine.ron", "()"), shipped("default"));
     let default: EstimatorSpec = shipped("default");
-    let partial: EstimatorSpec = parsed("mine.ron", "(window_s: 3.0, surfels: (levels: 2, min_points: 6))");
+    let partial: EstimatorSpec = parsed("mine.ron", "(window_s: 3.0, surfels: (levels: 2, fine: (min_points: 6)))");
     let mut expected = default.clone();
-    (expected.window_s, expected.surfels.levels, expected.surfels.min_points) = (3.0, 2, 6);
+    (expected.window_s, expected.surfels.levels, expected.surfels.fine.min_points) = (3.0, 2, 6);
     assert_eq!(partial, expected);
     assert_eq!(EstimatorSpec::default(), default);
 

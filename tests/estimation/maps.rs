@@ -270,8 +270,11 @@ impl Surfaces {
         // Merged, from an approximate pose.
         let truly = first.pose_of(second);
         let about = displaced(&truly, Vector::new(-0.5, 0.5, 0.0), -12.0);
-        let found = locate_map(&first.map, &second.map, &about, &spec()).unwrap();
+        let found = locate_map(&first.map, &second.map, Some(&about), &spec()).unwrap();
         let apart = truly.inverse() * found.map_from_query;
+        let anywhere = locate_map(&first.map, &second.map, None, &spec()).unwrap();
+        let from_each_other = found.map_from_query.inverse() * anywhere.map_from_query;
+        assert!(from_each_other.translation.vector.norm() < 1e-3, "{from_each_other}");
         // Worst of ten pairs of seeds: 2.5 mm and 0.72 mrad.
         assert!(apart.translation.vector.norm() < 0.0075 && apart.rotation.angle() < 0.0022, "{apart}");
         let merged = merge_maps(&first.map, &second.map, &found.map_from_query).unwrap();

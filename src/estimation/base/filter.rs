@@ -13,6 +13,7 @@
 
 use super::fixes::FixSigmas;
 use crate::EstimatorSpec;
+use crate::clock::RATE_WALK_PER_SQRT_S;
 use crate::strapdown::{Biases, Interval, State};
 use nalgebra::{Matrix3, SMatrix, SVector};
 use zsim_base::geometry::{Pose, Rotation, Vector, gravity_in_world, skew};
@@ -38,8 +39,6 @@ const START_VELOCITY: f64 = 0.5;
 const START_OFFSET_S: f64 = 5e-3;
 /// Initial standard deviation of the direction of gravity in the world, rad: levelling error of the map.
 const START_TILT: f64 = 5e-3;
-/// Random walk of the clock rate, 1/sqrt(s): 0.2 ppm, a quartz at room temperature.
-const CLOCK_RATE_WALK: f64 = 2e-7;
 /// Huber threshold on the Mahalanobis norm of the six-dimensional innovation.
 const HUBER_THRESHOLD: f64 = 5.0;
 
@@ -187,7 +186,7 @@ impl Filter {
         for (at, variance) in process_noise {
             (at..at + 3).for_each(|k| self.covariance[(k, k)] += variance);
         }
-        self.covariance[(CLOCK_RATE, CLOCK_RATE)] += CLOCK_RATE_WALK * CLOCK_RATE_WALK * h;
+        self.covariance[(CLOCK_RATE, CLOCK_RATE)] += RATE_WALK_PER_SQRT_S * RATE_WALK_PER_SQRT_S * h;
         self.estimate = self.estimate.propagated(interval);
         transition
     }

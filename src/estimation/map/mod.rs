@@ -49,23 +49,28 @@ pub fn map_of(
     map_from(finest_voxel_m, levels, surfels)
 }
 
-/// Registers the map `other` to `map`, starting at the pose `start`.
+/// Registers the map `other` to `map`, starting at the pose `start`, or anywhere.
 ///
 /// Both maps must be level. `start` is the pose of the origin of `other` in `map`; it must be right to within 1 m
-/// horizontally and 20 degrees of heading.
+/// horizontally and 20 degrees of heading. Without it that origin is searched in the extent of `map`, with any heading.
 ///
 /// # Errors
 /// When no pose matches, or several poses match equally well.
 pub fn locate_map(
     map: &SurfelMap,
     other: &SurfelMap,
-    start: &Pose,
+    start: Option<&Pose>,
     spec: &EstimatorSpec,
 ) -> Result<LocalisedPose, EstimationError> {
     let surfels = spec.registration.surfels(&spec.surfels);
     let relocaliser = Relocaliser::new(map, &spec.matching, &surfels, &spec.solve);
     let query: Vec<Patch> = other.surfels().iter().map(Patch::from_map_surfel).collect();
-    relocaliser.find_near(&query, &Vector::zeros(), start).map_err(EstimationError::NotInMap)
+    let origin = Vector::zeros();
+    let found = match start {
+        Some(start) => relocaliser.find_near(&query, &origin, start),
+        None => relocaliser.find_anywhere(&query, &origin, &Pose::identity()),
+    };
+    found.map_err(EstimationError::NotInMap)
 }
 
 /// Merges two maps in the frame of the first.

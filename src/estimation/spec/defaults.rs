@@ -1,6 +1,7 @@
 //! Default settings: those of `specs/estimators/default.ron`, which is in the binary.
 
 use super::removed;
+use super::surfel::FineSurfelSpec;
 use super::{
     ClockSpec, EstimatorSpec, ExtrinsicsSpec, InertialSpec, MatchingSpec, PlacesSpec, RegistrationSpec, SolveSpec,
     SurfelSpec, ViewSpec,
@@ -64,6 +65,7 @@ macro_rules! parts {
 
 parts! {
     SurfelSpec: surfels;
+    FineSurfelSpec: surfels.fine;
     MatchingSpec: matching;
     SolveSpec: solve;
     InertialSpec: inertial;

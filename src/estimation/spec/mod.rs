@@ -199,7 +199,9 @@ impl EstimatorSpec {
             "gives more than 400 knots per window".into(),
         )?;
         require((1..=MAX_LEVELS).contains(&self.surfels.levels), "levels", format!("must be 1 to {MAX_LEVELS}"))?;
-        require(self.surfels.min_points >= 4, "min_points", "must be at least 4 to define a plane".into())?;
+        for min_points in [self.surfels.min_points, self.surfels.fine.min_points] {
+            require(min_points >= 4, "min_points", "must be at least 4 to define a plane".into())?;
+        }
         require(self.matching.neighbours >= 1, "neighbours", "must be at least 1".into())?;
         for (key, degrees) in [
             ("max_incidence_deg", self.surfels.max_incidence_deg),

@@ -3,11 +3,10 @@
 use zsim_base::spec::SpecError;
 
 /// Keys that are no longer settings, and the setting or rule that took their place.
-const REMOVED: [(&str, &str); 22] = [
+const REMOVED: [(&str, &str); 20] = [
     ("formulation", "the trajectory is always in IMU time"),
     ("offset_grids", "each resolution has an offset grid"),
     ("flat_within_sigmas", "max_thickness_sigmas is the limit of flat surfels, too"),
-    ("fine", "fine_below_conditioning; fine surfels need half of min_points"),
     ("reciprocal", "matches are always reciprocal"),
     ("match_weight", "match_sigma_m sets the weight of matches"),
     ("covariance_inflation", "the covariance is that of the measurements"),
@@ -25,7 +24,6 @@ const REMOVED: [(&str, &str); 22] = [
     ("length_s", "window_s; a node of the pose graph has the length of a window"),
     ("max_plane_distance_m", "matching.max_plane_distance_m, for places, too"),
     ("again_after_s", "two and a half windows"),
-    ("min_points", "min_points of surfels; fine surfels need half of it"),
 ];
 
 /// The same error, with what took the place of the key that it is about, if earlier versions had it.

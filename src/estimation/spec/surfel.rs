@@ -17,10 +17,9 @@ pub struct SurfelSpec {
     pub levels: usize,
     /// Minimum number of points of a surfel, at least 4.
     pub min_points: usize,
-    /// While the conditioning of the last windows is below this, surfels are also built of voxels of half the finest edge,
-    /// and all surfels of half the minimum number of points; 0 for never.
-    #[serde(with = "zsim_base::spec::checked::Fraction")]
-    pub fine_below_conditioning: f64,
+    /// Additional surfels where the geometry is weak.
+    #[serde(default)]
+    pub fine: FineSurfelSpec,
     /// The points of a voxel are split where consecutive times differ by more than this, s.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub split_gap_s: f64,
@@ -59,11 +58,17 @@ pub struct SurfelSpec {
     pub max_range_m: f64,
 }
 
-impl SurfelSpec {
-    /// Minimum number of points of a surfel while fine surfels are built, as along a corridor or on stairs.
-    pub(crate) fn fine_min_points(&self) -> usize {
-        (self.min_points / 2).max(4)
-    }
+/// Additional surfels where the geometry is weak, as along a corridor or on stairs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(default)]
+pub struct FineSurfelSpec {
+    /// While the conditioning of the last windows is below this, surfels are also built of voxels of half the finest edge;
+    /// 0 for never.
+    #[serde(with = "zsim_base::spec::checked::Fraction")]
+    pub below_conditioning: f64,
+    /// Minimum number of points of all surfels there, at least 4.
+    pub min_points: usize,
 }
 
 /// Surfel matching.

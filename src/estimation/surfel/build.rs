@@ -80,7 +80,7 @@ impl SurfelBuilder {
                 self.fragments(returns, &points, &origin, (edge_m, shift * edge_m))
             })
             .collect();
-        let min_points = if detail == Detail::Fine { self.spec.fine_min_points() } else { self.spec.min_points };
+        let min_points = if detail == Detail::Fine { self.spec.fine.min_points } else { self.spec.min_points };
         let surfels_of = |grid: &Grid| -> Vec<SurfelThickness> {
             let cells = merge_by_cell(grid, &self.spec, min_points);
             let fit = |cell| self.fit_surfel(cell, grid.level, &origin, &unknowns.lidar, motion_at);

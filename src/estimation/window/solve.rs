@@ -118,7 +118,7 @@ impl Window {
 
     /// Builds fine surfels for the next window's time if the geometry of this one is weak.
     fn choose_detail(&mut self, solved: &WindowSolution) {
-        let is_weak = solved.conditioning < self.spec.surfels.fine_below_conditioning;
+        let is_weak = solved.conditioning < self.spec.surfels.fine.below_conditioning;
         // At the start the geometry is weak because the head hardly sweeps yet; small surfels are then lines.
         let is_swept = self.rested_until_s <= self.start.u_s && !self.wide_matching;
         if is_weak && is_swept && solved.matches + solved.view_matches >= self.spec.solve.min_matches {
