@@ -19,8 +19,11 @@ const CELL_M: f64 = 0.5;
 /// The region about an accepted pose: the grid has the search radius plus the range of the lidar indoors, and the radius bounds
 /// the computing time.
 const ABOUT_A_POSE: Region = Region { grid_m: (50.0, 12.0), search_m: (25.0, 8.0), up: (2, 2), candidates: (8, 32) };
-/// Maximum number of cells that the search of a whole map may test, for each heading: a site of 400 m by 400 m, 6 m high.
+/// Maximum number of cells that the search of a whole map may test, for each heading: a site of 400 m by 400 m, 3 m high.
 const MAX_SEARCHED_CELLS: usize = 4_000_000;
+/// Candidates in a whole map, per heading and refined: the correct pose must be among the refined, or a similar one elsewhere
+/// would be taken for it.
+const IN_A_MAP: (usize, usize) = (32, 512);
 /// Heading steps per full circle (4.5 degrees each).
 const HEADINGS: usize = 80;
 /// Maximum number of query patches in the correlation.
@@ -49,9 +52,6 @@ impl GridPose {
         turns.min(HEADINGS as i32 - turns) <= SUPPRESSION.1 && x.max(y) <= SUPPRESSION.0 && z <= up
     }
 }
-
-/// Candidates in a whole map: the correct pose must be among those refined, or a similar one elsewhere would be taken for it.
-const IN_A_MAP: (usize, usize) = (32, 512);
 
 /// The region of a search about a point, horizontal and vertical distances, m.
 #[derive(Debug, Clone, Copy)]

@@ -81,8 +81,8 @@ pub struct InertialSpec {
     /// Factor on the calibrated noise densities; accounts for errors that are not white.
     #[serde(with = "zsim_base::spec::checked::Positive")]
     pub noise_inflation: f64,
-    /// Least prior standard deviation of the estimated scale errors and misalignments (rad) of gyroscope and accelerometer, 0..1; a larger
-    /// one of the IMU's model is used instead. 0 to estimate none.
+    /// Least prior standard deviation of the estimated scale errors and misalignments (rad) of gyroscope and accelerometer,
+    /// 0..1; a larger one of the IMU's model is used instead. 0 to estimate none.
     #[serde(with = "zsim_base::spec::checked::Fraction")]
     pub matrix_sigma: f64,
     /// Residual error of the gyroscope in proportion to the reading, added to the noise, 0..1.

@@ -34,3 +34,28 @@ pub(super) fn explained(error: SpecError) -> SpecError {
         None => error,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::EstimatorSpec;
+    use zsim_base::spec::{NamedSpec, Source};
+
+    fn error_of(text: &str) -> String {
+        EstimatorSpec::parse(&Source::in_memory("mine.ron", text)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_removed_key_is_an_error_at_its_place_that_names_what_replaced_it() {
+        for (text, instead) in [
+            ("(\n formulation: paper)", "IMU time"),
+            ("(solve: (\n cauchy_end: 2.0))", "in its place: cauchy"),
+            ("(registration: (\n finest_voxel_m: 0.3))", "surfels.finest_voxel_m"),
+            ("(registration: (places: (\n length_s: 5.0)))", "window_s"),
+        ] {
+            let error = error_of(text);
+            assert!(error.starts_with("mine.ron:2:2: ") && error.contains(instead), "{error}");
+        }
+        let error = error_of("(solve: (\n cauchi: 2.0))");
+        assert!(!error.contains("earlier versions"), "{error}");
+    }
+}
