@@ -9,7 +9,9 @@ use zsim_study::sweep::Shard;
 /// Vary the parameters of a run and report their effects: `zsim sweep` plan, run and merge in one
 ///
 /// Writes table.csv, a row per run, and its schema; summary.csv and study.md, the effect of each axis and its
-/// significance; report.html, a page with both, the plots and all runs to sort and filter; and plots. A second start in the same folder skips finished runs and continues.
+/// significance; report.html, a page with both, the plots and all runs to sort and filter; and plots.
+/// A second start in the same folder skips finished runs and continues. If the study has claims, it exits with
+/// code 1 when one is missed.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim study estimator_ablation --out results/estimator_ablation")]
 pub(super) struct Arguments {

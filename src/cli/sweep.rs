@@ -11,7 +11,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use zsim_base::spec::{Kind, NamedSpec, SpecError, find};
 use zsim_study::design::DesignSpec;
-use zsim_study::sweep::{MergedReport, Plan, Runner, Shard, Sweep, SweepSpec, SweepStatus, limit_process};
+use zsim_study::sweep::{
+    ComparedNumber, MergedReport, Plan, Runner, Shard, Sweep, SweepSpec, SweepStatus, limit_process,
+};
 
 /// Repeat a run with other parameters: plan, run in pieces on any machines, merge
 ///
@@ -219,11 +221,15 @@ pub(super) fn merge_with_bar(sweep: &Sweep, global: &Global) -> anyhow::Result<M
 pub(super) fn merge(sweep: &Sweep, folder: &Path, global: &Global) -> anyhow::Result<Completion> {
     let merged = merge_with_bar(sweep, global)?;
     let words = format!("{}\n{}", merged.text, status_text(&merged.status));
-    let figures = json!({ "status": merged.status, "summary": merged.summary });
+    let figures = json!({ "status": merged.status, "summary": merged.summary, "claims": merged.claims });
     output::print_result(global, &words, figures, Some(folder))?;
     if merged.status.failed == merged.status.points {
         let first = sweep.first_failure()?.unwrap_or_default();
         bail!("all {} runs failed: {first}", merged.status.points);
+    }
+    let missed: Vec<&ComparedNumber> = merged.claims.iter().filter(|claim| claim.is_missed()).collect();
+    if let Some(first) = missed.first() {
+        bail!("{} of {} claims missed, the first: {}: {}", missed.len(), merged.claims.len(), first.what, first.ours);
     }
     Ok(if merged.status.missing == 0 { Completion::Done } else { Completion::WithLoss })
 }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The examples, and the files that each must write.
-const EXAMPLES: [(&str, &[&str]); 7] = [
+const EXAMPLES: [(&str, &[&str]); 8] = [
     ("ci", &["recording.mcap", "recording.tum", "estimate.tum", "comparison/comparison.json"]),
+    ("claims", &["claims/table.csv", "claims/study.md"]),
     ("evalio", &["recordings/recording.mcap", "kiss/recording.tum", "comparison/comparison.json"]),
     ("own_recording", &["estimate/metrics.json", "estimate/cloud.ply", "estimate/report.html"]),
     ("own_scene", &["workshop.svg", "workshop/metrics.json", "workshop/report.html"]),

@@ -63,7 +63,7 @@ const LEAST: [(Kind, &str); 22] = [
     ),
     (
         Kind::Experiment,
-        r#"runs((figure: "-", study: "paper_rigid_link", results: []))"#,
+        r#"runs((figure: "-", study: "paper_rigid_link"))"#,
     ),
 ];
 
@@ -155,7 +155,7 @@ fn all_keys_that_are_missing_are_named_at_once() {
         (Kind::Study, "(base: spring())", "`SweepSpec` needs `axes`"),
         (Kind::Faults, "(faults: [()])", "`FaultSpec` needs `sensor` and `fault`"),
         (Kind::Scene, "(movers: [(repeats: true)])", "`MoverSpec` needs `template` and `waypoints`"),
-        (Kind::Experiment, "runs(())", "`RunsSpec` needs `figure`, `study` and `results`"),
+        (Kind::Experiment, "runs(())", "`RunsSpec` needs `figure` and `study`"),
     ] {
         let stderr = error(kind, text);
         assert!(stderr.contains(message), "{text}: {stderr}");

@@ -1,6 +1,7 @@
 //! Studies: coverage, gains, latency, spring design, sweeps, and the paper's experiments.
 
 mod bounds;
+mod claims;
 mod coverage;
 mod gains;
 mod kubernetes;

@@ -8,8 +8,8 @@ use std::time::SystemTime;
 use zsim::dynamics::{AccelerationKind, DampingSpec, HeadModel, load};
 use zsim::head::gains::with_damping;
 use zsim::motion::Axis;
-use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, Verdict, fit_damping};
-use zsim::study::sweep::Runner;
+use zsim::study::reproduction::{Experiment, Extent, PeaksSpec, fit_damping};
+use zsim::study::sweep::{Runner, Verdict};
 
 const ZSIM: &str = env!("CARGO_BIN_EXE_zsim");
 
@@ -214,12 +214,10 @@ fn five_fixed_views_drift_less_than_none_in_the_smoke_test_of_motion_capture() {
 }
 
 #[test]
-fn an_experiment_with_a_level_that_its_study_lacks_is_an_error() {
+fn an_experiment_whose_study_has_no_claims_is_an_error() {
     let here = tempfile::tempdir().unwrap();
     let path = here.path().join("wrong.ron");
-    let text = r#"runs((figure: "1", title: "t", study: "paper_office", quick: (duration_s: 9.0), notes: [],
-        results: [(figure: "1", what: "w", level: "attic", measure: position_rmse_m, goal: 1.0)]))"#;
-    std::fs::write(&path, text).unwrap();
+    std::fs::write(&path, r#"runs((figure: "1", study: "imu_quality"))"#).unwrap();
     let error = Experiment::load(path.to_str().unwrap()).unwrap_err().to_string();
-    assert!(error.contains("no level \"attic\""), "{error}");
+    assert!(error.contains("\"imu_quality\" has no claims"), "{error}");
 }

@@ -1,7 +1,8 @@
 //! The results of the paper's experiments as a document.
 
-use super::{ComparedNumber, Comparison, Extent, Finding, Verdict};
+use super::{Extent, Finding};
 use crate::StudyError;
+use crate::sweep::{ComparedNumber, Comparison, Verdict};
 use std::path::Path;
 use zsim_base::files::FileError;
 use zsim_report::{Content, Document, Plot, Table};

@@ -1,6 +1,6 @@
 //! An experiment: its spec, its run, and its stored result.
 
-use super::{ExperimentResult, ExperimentSpec, Extent, RunsSpec, gain_curves, runs, timing};
+use super::{ExperimentResult, ExperimentSpec, Extent, RunsSpec, clock_plot, gain_curves, timing};
 use crate::StudyError;
 use crate::sweep::{ContentHash, MergedReport, Plan, Runner, Shard, Sweep, SweepSpec};
 use serde::{Deserialize, Serialize};
@@ -100,9 +100,13 @@ impl Experiment {
                 timing::result(&spec.figure, &report.latency.ok_or_else(|| sweep.failed())?, folder)?
             }
             ExperimentSpec::Runs(spec) => {
-                let (sweep, _) = self.run_study(self.study_of_runs(spec, extent)?, folder, anew, runner)?;
-                runs::plot(spec, &sweep, folder)?;
-                runs::result(spec, &sweep)?
+                let (sweep, report) = self.run_study(self.study_of_runs(spec, extent)?, folder, anew, runner)?;
+                if spec.plots_clock
+                    && let Some(figure) = clock_plot::figure(&sweep)?
+                {
+                    figure.save(folder, "clock")?;
+                }
+                ExperimentResult { rows: report.claims, notes: spec.notes.clone() }
             }
         };
         let stored = StoredResult { inputs: self.inputs(extent)?, result };

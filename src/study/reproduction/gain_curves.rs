@@ -1,12 +1,11 @@
 //! Figure 3 of the paper: gain curves of several heads.
 
 use super::head_response::HeadResponse;
-use super::{
-    ComparedNumber, Comparison, DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping,
-    gain_plots,
-};
+use super::{DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping, gain_plots};
 use crate::StudyError;
-use crate::sweep::{AxisSpec, BaseSpec, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec};
+use crate::sweep::{
+    AxisSpec, BaseSpec, ComparedNumber, Comparison, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec,
+};
 use rayon::prelude::*;
 use std::path::Path;
 use zsim_base::files::FileError;
@@ -83,6 +82,7 @@ fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent) -> Result<Pl
         by: None,
         front: Vec::new(),
         limits: Vec::new(),
+        claims: Vec::new(),
     };
     Plan::of_gains(&format!("figure {}", spec.figure), &sweep, gains, heads)
 }

@@ -5,7 +5,6 @@
 //! [`paper_document`] combines all finished experiments.
 
 mod clock_plot;
-mod comparison;
 mod damping;
 mod document;
 mod experiment;
@@ -14,17 +13,12 @@ mod gain_curves;
 mod gain_plots;
 mod head_response;
 mod result;
-mod runs;
 mod spec;
 mod timing;
 
-pub use comparison::{Comparison, Verdict};
 pub use damping::{DampingFit, FittedPeak, fit_damping};
 pub use document::{PAPER_TITLE, paper_document};
 pub use experiment::{Experiment, Finding};
 pub use extent::Extent;
-pub use result::{ComparedNumber, ExperimentResult};
-pub use spec::{
-    ClaimSpec, DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, QuickSpec, ResultSpec, RunsSpec,
-    TimingMapsSpec, WarningSpec,
-};
+pub use result::ExperimentResult;
+pub use spec::{DesignedSpec, ExperimentSpec, GainCurvesSpec, PeaksSpec, QuickSpec, RunsSpec, TimingMapsSpec};

@@ -17,11 +17,11 @@ pub enum ExperimentSpec {
     GainCurves(GainCurvesSpec),
     /// Maps of one recording with timing errors.
     Latency(TimingMapsSpec),
-    /// Measures of the runs of a study.
+    /// A study with claims.
     Runs(RunsSpec),
 }
 
-/// Measures of the runs of a study, compared with the paper and with goals.
+/// A study whose claims compare its result with the paper and with goals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunsSpec {
@@ -30,22 +30,14 @@ pub struct RunsSpec {
     /// What the experiment shows, for its heading.
     #[serde(default)]
     pub title: String,
-    /// The study: a name under `specs/studies/`, or a file. It has one axis.
+    /// The study: a name under `specs/studies/`, or a file. It has claims.
     pub study: String,
     /// The smoke test.
     #[serde(default)]
     pub quick: QuickSpec,
-    /// Whether to plot the clock offset of each run over time. The study measures `clock_error_30s_s`.
+    /// Whether to plot the clock offset of each run over time. The study measures `clock_error_30s_s` and has one axis.
     #[serde(default)]
     pub plots_clock: bool,
-    /// Results to compare.
-    pub results: Vec<ResultSpec>,
-    /// Statements of the paper about two levels.
-    #[serde(default)]
-    pub claims: Vec<ClaimSpec>,
-    /// Levels whose status must not be "good" where the error is large.
-    #[serde(default)]
-    pub warns: Vec<WarningSpec>,
     /// Assumptions and discrepancies.
     #[serde(default)]
     pub notes: Vec<String>,
@@ -75,62 +67,6 @@ impl Default for QuickSpec {
 
 fn one() -> NonZeroUsize {
     NonZeroUsize::MIN
-}
-
-/// A measure of a level of the study, median and worst of the seeds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ResultSpec {
-    /// Number of the figure in the paper.
-    pub figure: String,
-    /// Name of the quantity.
-    pub what: String,
-    /// Level of the study's axis.
-    pub level: String,
-    /// Measure of the study.
-    pub measure: Measure,
-    /// Number in the paper, in the display unit of the measure (mm, mm/min, degrees/min, ms).
-    #[serde(default)]
-    pub paper: Option<f64>,
-    /// What the paper states, if more than the number.
-    #[serde(default)]
-    pub paper_text: Option<String>,
-    /// Goal for the median, in the same unit; the worst may be twice as large.
-    #[serde(with = "checked::Positive")]
-    pub goal: f64,
-}
-
-/// A statement of the paper: a measure is smaller at one level than at another.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ClaimSpec {
-    /// The statement.
-    pub what: String,
-    /// Measure of the study.
-    pub measure: Measure,
-    /// Level with the smaller median.
-    pub smaller: String,
-    /// Level with the larger median.
-    pub larger: String,
-}
-
-/// A limit of the method, which the result must state: no run of a level has the status "good" and an error above both 5 cm and
-/// 1 % of the path.
-///
-/// The study measures `status`, `aligned_rmse_m` and `way_m`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct WarningSpec {
-    /// The limit.
-    pub what: String,
-    /// Level of the study's axis.
-    pub level: String,
-}
-
-impl WarningSpec {
-    /// Measures that it needs.
-    pub(super) const MEASURES: [Measure; 3] =
-        [Measure::STATUS, Measure::named("aligned_rmse_m"), Measure::named("way_m")];
 }
 
 /// Gain curves of several heads.
@@ -248,19 +184,8 @@ impl RunsSpec {
         let of_study = find_from(Kind::Study, source, &self.study)?;
         let mut spec: SweepSpec = SweepSpec::parse(&of_study)?;
         let wrong = |key: &str, message: String| Err(SpecError::about(source, key, message));
-        let [AxisSpec::Levels { levels, .. }] = spec.axes.as_slice() else {
-            return wrong("study", format!("the study \"{}\" does not have one axis with named levels", self.study));
-        };
-        let results = self.results.iter().map(|result| (&result.level, result.measure));
-        let claims = self.claims.iter().flat_map(|claim| [&claim.smaller, &claim.larger].map(|of| (of, claim.measure)));
-        let warns = self.warns.iter().flat_map(|warning| WarningSpec::MEASURES.map(|of| (&warning.level, of)));
-        for (level, measure) in results.chain(claims).chain(warns) {
-            if levels.iter().all(|other| other.name != *level) {
-                return wrong("results", format!("the study \"{}\" has no level \"{level}\"", self.study));
-            }
-            if !spec.measures.contains(&measure) {
-                return wrong("results", format!("the study \"{}\" does not measure {}", self.study, measure.key()));
-            }
+        if spec.claims.is_empty() {
+            return wrong("study", format!("the study \"{}\" has no claims", self.study));
         }
         if self.plots_clock && !spec.measures.contains(&Measure::CLOCK_ERROR_30S_S) {
             let key = Measure::CLOCK_ERROR_30S_S.key();

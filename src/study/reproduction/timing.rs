@@ -1,8 +1,9 @@
 //! Figure 4 of the paper: latency and timing noise.
 
-use super::{ComparedNumber, Comparison, ExperimentResult};
+use super::ExperimentResult;
 use crate::StudyError;
 use crate::latency::{LatencyResult, conclusions, curve_figure, map_figure};
+use crate::sweep::{ComparedNumber, Comparison};
 use std::path::Path;
 use zsim_run::timing::{ClockState, Disturbance};
 

@@ -2,7 +2,7 @@
 
 use super::levels::{add_tables, digits, heading};
 use super::runs::Runs;
-use super::{Measure, Summary, Sweep, SweepStatus};
+use super::{ComparedNumber, Comparison, Measure, Summary, Sweep, SweepStatus};
 use crate::StudyError;
 use zsim_report::page::{Interactive, MAX_PAGE_RUNS, PointColumn, RunPoints};
 use zsim_report::{Content, Document, Plot, Table, axis_label, quantity_name};
@@ -19,12 +19,17 @@ impl Sweep {
         &self,
         summary: &Summary,
         status: &SweepStatus,
+        claims: &[ComparedNumber],
         plots: Vec<Plot>,
     ) -> Result<Document, StudyError> {
         let (points, failed, missing) = (status.points, status.failed, status.missing);
         let version = env!("CARGO_PKG_VERSION");
         let written = format!("Written by zsim {version}: {points} runs, {failed} of them failed, {missing} missing.");
         let mut document = Document::new(self.plan.name(), written);
+        if !claims.is_empty() {
+            document.heading("Claims");
+            document.add(claim_table(claims));
+        }
         add_tables(&mut document, summary, &self.plan);
         self.integrity_report()?.iter().for_each(|report| report.add_to(&mut document));
         document.heading("Plots");
@@ -100,6 +105,16 @@ impl Sweep {
         let folder = self.can_repeat().then(|| format!("results/{}", self.plan.name()));
         Ok(RunPoints { columns, x, y, front, folder })
     }
+}
+
+/// Claims with their goals, results and verdicts.
+fn claim_table(claims: &[ComparedNumber]) -> Table {
+    let row = |claim: &ComparedNumber| {
+        let [goal, median, worst, _, verdict] =
+            claim.comparison.as_ref().map_or_else(Default::default, Comparison::cells);
+        vec![claim.what.clone(), goal, median, worst, verdict]
+    };
+    Table::new(["claim", "goal", "result, median", "worst", "goal is"], claims.iter().map(row))
 }
 
 /// Rows of the table on the page: the first [`MAX_PAGE_RUNS`], and after them those of the front, as far as there is room.

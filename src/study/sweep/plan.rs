@@ -93,6 +93,7 @@ impl Plan {
         if plan.runs() > MAX_RUNS {
             return Err(about(format!("{} runs with all seeds: expected at most {MAX_RUNS}", plan.runs())).into());
         }
+        plan.check_claims(source)?;
         Ok(plan)
     }
 

@@ -1,7 +1,8 @@
 //! Report of a merged sweep: summary tables and plots.
 
 use super::levels::{csv, trends_csv};
-use super::{Summary, Sweep, SweepStatus};
+use super::runs::Runs;
+use super::{ComparedNumber, Summary, Sweep, SweepStatus};
 use crate::StudyError;
 use crate::latency::LatencyResult;
 use zsim_base::files::write_text;
@@ -15,6 +16,8 @@ pub struct MergedReport {
     pub summary: Summary,
     /// The result for the terminal.
     pub text: String,
+    /// The claims of the study in comparison with the result; none before all runs are finished.
+    pub claims: Vec<ComparedNumber>,
     /// The latency study; `None` if the runs have no timing errors, or if a run failed or is missing.
     pub latency: Option<LatencyResult>,
 }
@@ -34,7 +37,8 @@ impl Sweep {
             return Err(StudyError::Plan { what: "sweep", message });
         }
         let summary = self.summary()?;
-        let document = self.document(&summary, &status, self.draw(&summary)?)?;
+        let claims = if status.missing == 0 { self.judged_claims(&Runs::read(self)?)? } else { Vec::new() };
+        let document = self.document(&summary, &status, &claims, self.draw(&summary)?)?;
         let mut files =
             vec![("summary.csv", csv(&summary)), ("study.md", document.markdown("")), ("report.html", document.html())];
         if !summary.trends.is_empty() {
@@ -45,6 +49,6 @@ impl Sweep {
         }
         let latency = self.latency_result()?;
         latency.as_ref().map_or(Ok(()), |study| self.write_latency(study))?;
-        Ok(MergedReport { status, summary, text: document.text(), latency })
+        Ok(MergedReport { status, summary, text: document.text(), claims, latency })
     }
 }

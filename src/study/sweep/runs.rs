@@ -3,7 +3,7 @@
 use super::axis::Levels;
 use super::design::AxisPosition;
 use super::table::{Column, ColumnType};
-use super::{Measure, Plan, Sweep};
+use super::{Plan, Sweep};
 use crate::StudyError;
 
 /// Number of bins of a continuous axis in summaries and plots.
@@ -46,20 +46,6 @@ impl Runs {
     /// Row of run `number` in the table.
     pub fn row(&self, number: u64) -> Option<usize> {
         self.numbers.binary_search(&number).ok()
-    }
-}
-
-impl Sweep {
-    /// A measure of the runs at a level of the first axis, by name, in the unit of files; `None` for a failed run.
-    ///
-    /// # Errors
-    /// If the sweep is not merged.
-    pub(crate) fn values_at(&self, level: &str, measure: Measure) -> Result<Vec<Option<f64>>, StudyError> {
-        let Some(axis) = self.plan.axes().first() else { return Ok(Vec::new()) };
-        let levels = self.read_merged(&self.table(), &[(&axis.name, ColumnType::Text)])?;
-        let levels = levels.into_iter().flat_map(Column::texts);
-        let at_level = levels.zip(self.read_measure(measure)?).filter(|(of, _)| of.as_deref() == Some(level));
-        Ok(at_level.map(|(_, value)| value).collect())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Spec of a sweep: `specs/studies/NAME.ron`.
 
 use super::base_spec::usual;
-use super::{BaseSpec, GoalSpec, Measure, MeasureLimitSpec};
+use super::{BaseSpec, ClaimSpec, GoalSpec, Measure, MeasureLimitSpec, Setting};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use zsim_base::spec::checked;
@@ -37,6 +37,9 @@ pub struct SweepSpec {
     /// Limits of the runs in the Pareto front.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub limits: Vec<MeasureLimitSpec>,
+    /// Statements about the result. They are judged when all runs are finished; `zsim study` fails if one is missed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub claims: Vec<ClaimSpec>,
 }
 
 /// An axis: a parameter to vary.
@@ -115,20 +118,6 @@ pub struct LevelSpec {
     pub set: BTreeMap<String, Setting>,
 }
 
-/// Value of a setting.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(untagged)]
-pub enum Setting {
-    /// `true` or `false`.
-    Switch(bool),
-    /// A non-negative integer.
-    Count(u64),
-    /// A real number.
-    Number(f64),
-    /// A name of a spec, or of an option of the setting.
-    Text(String),
-}
-
 /// Selection of the combinations of axis values to run.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "snake_case")]
@@ -186,49 +175,6 @@ impl AxisSpec {
         match self {
             Self::Levels { name, .. } => format!("\"{name}\""),
             Self::Values { path, .. } | Self::Linear { path, .. } | Self::Log { path, .. } => format!("\"{path}\""),
-        }
-    }
-}
-
-impl std::fmt::Display for Setting {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Switch(on) => write!(f, "{on}"),
-            Self::Count(count) => write!(f, "{count}"),
-            Self::Number(number) => write!(f, "{number}"),
-            Self::Text(word) => f.write_str(word),
-        }
-    }
-}
-
-impl Setting {
-    /// The value as a number; `None` for switches and text.
-    pub fn number(&self) -> Option<f64> {
-        match self {
-            Self::Count(count) => Some(*count as f64),
-            Self::Number(number) => Some(*number),
-            Self::Switch(_) | Self::Text(_) => None,
-        }
-    }
-
-    /// The value for labels and tables: a real number has at most six significant digits.
-    pub(super) fn label(&self) -> String {
-        match self {
-            // 3.0999999999999996 becomes 3.1.
-            Self::Number(number) => {
-                format!("{number:.5e}").parse().map_or_else(|_| self.to_string(), |x: f64| x.to_string())
-            }
-            _ => self.to_string(),
-        }
-    }
-
-    /// The value as JSON.
-    pub(super) fn value(&self) -> serde_json::Value {
-        match self {
-            Self::Switch(on) => (*on).into(),
-            Self::Count(count) => (*count).into(),
-            Self::Number(number) => (*number).into(),
-            Self::Text(word) => word.as_str().into(),
         }
     }
 }

@@ -1,10 +1,10 @@
-//! Verdict on a result in comparison with the paper and the goal.
+//! Verdict on a result in comparison with a paper and a goal.
 
 use serde::{Deserialize, Serialize};
 
 /// Maximum factor between a result and a number that is read off a plot of the paper.
 const READING_FACTOR: f64 = 1.5;
-/// The worst of several seeds may be this factor above a goal for the median.
+/// By default the worst of several runs may be this factor beyond the goal for the median.
 const WORST_FACTOR: f64 = 2.0;
 
 /// Whether a result agrees with the paper, or meets the goal.
@@ -49,6 +49,46 @@ pub struct Comparison {
     pub verdict: Verdict,
 }
 
+/// A goal for the median of several runs, and a limit of the worst of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Whether the results should be at most the goal, not at least.
+    pub is_most: bool,
+    /// Goal for the median.
+    pub median: f64,
+    /// Limit of the worst; by default twice the goal, or half of it where results should be at least the goal.
+    pub worst: Option<f64>,
+}
+
+impl Goal {
+    /// A goal that the median should not exceed.
+    pub fn at_most(median: f64) -> Self {
+        Self { is_most: true, median, worst: None }
+    }
+
+    fn worst(self) -> f64 {
+        let factor = if self.is_most == (self.median >= 0.0) { WORST_FACTOR } else { 1.0 / WORST_FACTOR };
+        self.worst.unwrap_or(factor * self.median)
+    }
+
+    fn accepts(self, result: f64, limit: f64) -> bool {
+        if self.is_most { result <= limit } else { result >= limit }
+    }
+
+    fn in_words(self, unit: &str) -> String {
+        let bound = if self.is_most { "at most" } else { "at least" };
+        let goal = format!("{bound} {} {unit}", self.median);
+        let worst = self.worst.map_or_else(String::new, |worst| format!(", worst {worst} {unit}"));
+        format!("{}{}", goal.trim_end(), worst.trim_end())
+    }
+}
+
+/// The median of sorted numbers.
+fn median(sorted: &[f64]) -> Option<f64> {
+    let middle = [sorted.len().checked_sub(1)? / 2, sorted.len() / 2];
+    Some(0.5 * middle.map(|k| sorted[k]).iter().sum::<f64>())
+}
+
 impl Comparison {
     /// A single result, which should be near the number in the paper.
     pub fn near(unit: &str, paper: f64, result: f64) -> Self {
@@ -75,24 +115,26 @@ impl Comparison {
         }
     }
 
-    /// Results of several seeds, whose median should be at most `goal` and whose worst at most twice; `None` without results.
-    pub fn at_most(unit: &str, paper: Option<f64>, goal: f64, results: &[f64]) -> Option<Self> {
+    /// Results of several runs in comparison with a goal; `None` without results.
+    ///
+    /// A result is infinite if a run failed.
+    pub fn with_goal(unit: &str, paper: Option<f64>, goal: Goal, results: &[f64]) -> Option<Self> {
         let mut sorted = results.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
-        let worst = *sorted.last()?;
-        let median = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
+        let worst = if goal.is_most { *sorted.last()? } else { *sorted.first()? };
+        let median = median(&sorted)?;
         Some(Self {
             unit: unit.to_owned(),
             paper,
-            goal: format!("at most {goal} {unit}").trim_end().to_owned(),
+            goal: goal.in_words(unit),
             median,
             worst: (sorted.len() > 1).then_some(worst),
-            verdict: Verdict::of(median <= goal && worst <= WORST_FACTOR * goal),
+            verdict: Verdict::of(goal.accepts(median, goal.median) && goal.accepts(worst, goal.worst())),
         })
     }
 
     /// Goal, median, worst, ratio to the paper and verdict as cells of a table; empty where there is none.
-    pub(super) fn cells(&self) -> [String; 5] {
+    pub(crate) fn cells(&self) -> [String; 5] {
         let number = |x: f64| with_unit(x, &self.unit);
         [
             self.goal.clone(),
@@ -143,9 +185,18 @@ mod tests {
         assert_eq!(Comparison::near("", 15.0, f64::NAN).verdict, Verdict::Missed);
         assert_eq!(Comparison::above("mm", 10.0, 1.2, 11.0).verdict, Verdict::Missed);
         assert_eq!(Comparison::above("mm", 10.0, 1.2, 13.0).verdict, Verdict::Met);
-        let seeds = Comparison::at_most("mm", Some(6.9), 0.5, &[0.9, 0.3, 0.5, 0.4]).unwrap();
+        let seeds = Comparison::with_goal("mm", Some(6.9), Goal::at_most(0.5), &[0.9, 0.3, 0.5, 0.4]).unwrap();
         assert_eq!((seeds.median, seeds.worst, seeds.verdict), (0.45, Some(0.9), Verdict::Met));
-        assert_eq!(Comparison::at_most("mm", None, 0.5, &[0.4, 0.4, 1.1]).unwrap().verdict, Verdict::Missed);
-        assert!(Comparison::at_most("mm", None, 0.5, &[]).is_none());
+        let worst_beyond_twice = Comparison::with_goal("mm", None, Goal::at_most(0.5), &[0.4, 0.4, 1.1]).unwrap();
+        assert_eq!(worst_beyond_twice.verdict, Verdict::Missed);
+        assert!(Comparison::with_goal("mm", None, Goal::at_most(0.5), &[]).is_none());
+        let least = Goal { is_most: false, median: 0.98, worst: Some(0.9) };
+        let within = |results: &[f64]| Comparison::with_goal("", None, least, results).unwrap();
+        assert_eq!(
+            (within(&[1.0, 0.91, 0.99]).verdict, within(&[1.0, 0.89, 0.99]).verdict),
+            (Verdict::Met, Verdict::Missed)
+        );
+        assert_eq!((within(&[1.0, 0.5]).worst, within(&[1.0]).goal.as_str()), (Some(0.5), "at least 0.98, worst 0.9"));
+        assert_eq!(within(&[f64::NEG_INFINITY, 0.99, 0.99]).verdict, Verdict::Missed);
     }
 }
