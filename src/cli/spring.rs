@@ -1,8 +1,9 @@
 //! `zsim spring`: all about a spring, and the search for one.
 
 use super::arguments::{Global, OutArguments};
-use super::bars::WorkBar;
+use super::bars::{WorkBar, end_polling, stop_flag};
 use super::{Completion, output, quantity};
+use anyhow::Context;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use zsim_base::files::{replace_bytes, replace_text};
@@ -13,7 +14,7 @@ use zsim_head::coverage::{CoveragePlan, coverage_figure};
 use zsim_head::spring::{HeadExport, Shake, SpringReport, document, mode_figure, spring_report};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
 use zsim_study::design::{self, DesignSearch, DesignSpec, csv, pareto_figure, rejected_csv};
-use zsim_study::sweep::SweepSpec;
+use zsim_study::sweep::{Runner, SweepSpec};
 
 /// Report stiffness, rest, modes, field of view and limits of a spring, or another linkage, under its head; or
 /// search for one
@@ -74,6 +75,8 @@ struct Export {
 }
 
 /// Search for a spring that meets targets: the Pareto set as table, CSV and plot, verified by simulation
+///
+/// The journeys of a search are a sweep in DIR/journeys: a second start in the same folder skips finished ones and continues.
 #[derive(Args)]
 #[command(after_help = "Example:\n  zsim spring design spring_design --out results/springs")]
 struct Design {
@@ -194,13 +197,25 @@ fn search(wanted: &Design, global: &Global) -> anyhow::Result<Completion> {
         }
         Err(_) => error,
     })?;
-    let bar = WorkBar::new(global, "searching");
-    let study = DesignSearch::new(&spec, &source)?.run(&|fraction| bar.set_fraction(fraction))?;
-    drop(bar);
+    let search = DesignSearch::new(&spec, &source)?;
     let stem = Path::new(&wanted.file).file_stem().unwrap_or_default().to_string_lossy();
     let name = spec.name.as_deref().unwrap_or(&stem);
     let out = wanted.out.out.clone().unwrap_or_else(|| PathBuf::from(format!("results/{name}")));
-    let folder = output::folder(&out, wanted.out.force)?;
+    let folder = match spec.has_journeys_in(&out) {
+        true => output::folder_to_resume(&out)?,
+        false => output::folder(&out, wanted.out.force)?,
+    };
+    let program = std::env::current_exe().context("this program's own path is not known")?;
+    let bar = WorkBar::new(global, "searching");
+    let on_progress = |fraction: f64| bar.set_fraction(fraction);
+    let runner = Runner { program: &program, stop: stop_flag(), on_progress: &on_progress };
+    let study = search.run(&folder, wanted.out.force, &runner).inspect_err(|_| {
+        if spec.has_journeys_in(&folder) {
+            super::full_run::print_partial_results(&folder);
+        }
+    })?;
+    drop(bar);
+    end_polling();
     replace_text(&folder.join("pareto.csv"), &csv(&study))?;
     replace_text(&folder.join("rejected.csv"), &rejected_csv(&study))?;
     replace_text(&folder.join("design.ron"), &source.text)?;

@@ -72,5 +72,5 @@ pub use result_files::{METRICS, estimate_files, full_run_files};
 pub use results::{Needs, ReferenceResults, Results, Swing};
 pub use sensor_models::{ImuNoiseSpec, LidarNoiseSpec};
 pub use spec_types::{INPUT_TYPES, SpecType, load_input};
-pub use temporary_recording::{Compared, MAX_RECORDINGS, TemporaryRecording, record_simulations, run_alone};
+pub use temporary_recording::{Compared, MAX_RECORDINGS, TemporaryRecording, record_simulations};
 pub use viewer_files::ViewerFiles;

@@ -220,21 +220,6 @@ impl TemporaryRecording {
     }
 }
 
-/// Simulates and estimates one run on this thread, without timing errors and reference system.
-///
-/// # Errors
-/// If the specs do not make a simulation, or if it or the estimate fails or exceeds `limit_s`.
-pub fn run_alone(inputs: &RunInputs, needs: &[Needs], limit_s: f64) -> Result<Results, RunError> {
-    let recorded = needs.iter().any(|need| need.is_of_estimate());
-    let simulation = Simulation::build(inputs.simulation.clone())?;
-    let mut all = Results::default();
-    for recording in record_simulations(vec![simulation], recorded, 1, limit_s)? {
-        let compared = recording.compared_with(limit_s, needs, inputs, 0)?;
-        (all, _) = recording.results(needs, limit_s, inputs, 0, &compared)?;
-    }
-    Ok(all)
-}
-
 /// What a run is compared with.
 pub struct Compared {
     /// Information bound with an unknown map, m.

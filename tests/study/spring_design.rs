@@ -1,5 +1,9 @@
 //! Spring design by search.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::SystemTime;
 use zsim::dynamics::{HeadModel, LinkageSpec};
 use zsim::head::coverage::{CoveragePlan, coverage};
 use zsim::head::spring::{MISSION_HOURS, simulated};
@@ -11,17 +15,25 @@ use zsim::study::design::{
     BuildLimitsSpec, CoilDesign, DesignSearch, DesignSpec, DesignStudy, SpaceSpec, WireStock, csv, pareto_figure,
     rejected_csv,
 };
-use zsim::study::sweep::{Measure, pareto_set};
+use zsim::study::sweep::{Measure, Runner, pareto_set};
 
 fn load(name: &str) -> (DesignSpec, Source) {
     let source = find(Kind::Study, name).unwrap();
     (parse(&source).unwrap(), source)
 }
 
+/// Runs a search in a folder of its own.
+fn run(search: &DesignSearch) -> DesignStudy {
+    let folder = tempfile::tempdir().unwrap();
+    let program = Path::new(env!("CARGO_BIN_EXE_zsim"));
+    let runner = Runner { program, stop: &AtomicBool::new(false), on_progress: &|_| () };
+    search.run(folder.path(), false, &runner).unwrap()
+}
+
 fn small(name: &str) -> DesignStudy {
     let (spec, source) = load(name);
     let spec = DesignSpec { evaluations: 800, candidates: 3, ..spec };
-    DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap()
+    run(&DesignSearch::new(&spec, &source).unwrap())
 }
 
 #[test]
@@ -76,7 +88,7 @@ fn optimisation_gives_a_better_front_than_sampling() {
 fn a_catalogue_is_searched_completely() {
     let (spec, source) = load("spring_stock");
     let spec = DesignSpec { candidates: 2, ..spec };
-    let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+    let study = run(&DesignSearch::new(&spec, &source).unwrap());
     assert_eq!(study.evaluated, 690);
     assert!(study.candidates.iter().all(|v| v.candidate.coil.label() == v.candidate.coil.name));
     assert!(study.feasible > 3, "{}", study.feasible);
@@ -100,7 +112,7 @@ fn files_that_a_search_names_are_relative_to_its_file() {
         std::fs::write(&path, design.replace("\"handheld\"", &format!("\"{head}\""))).unwrap();
         let source = Source::read(&path).unwrap();
         let spec: DesignSpec = parse(&source).unwrap();
-        DesignSearch::new(&spec, &source).map(|search| search.run(&|_| ()).unwrap())
+        DesignSearch::new(&spec, &source).map(|search| run(&search))
     };
     // With and without the extension; a name without a file is that of a shipped head.
     for head in ["mine.ron", "mine", "handheld"] {
@@ -114,7 +126,7 @@ fn files_that_a_search_names_are_relative_to_its_file() {
 }
 
 /// A search in a catalogue of four springs by journeys of 12 s with two seeds.
-fn by_outcome(goals: &str, limits: &str) -> Result<DesignStudy, String> {
+fn search_by_journeys(goals: &str, limits: &str) -> Result<DesignSearch, String> {
     let folder = tempfile::tempdir().unwrap();
     let catalogue = "name,coil_diameter_mm,wire_diameter_mm,active_coils,free_length_mm,material\n\
                      usual,25.0,3.0,12.0,120.0,spring_steel\n\
@@ -132,8 +144,40 @@ fn by_outcome(goals: &str, limits: &str) -> Result<DesignStudy, String> {
     std::fs::write(&path, text).unwrap();
     let source = Source::read(&path).unwrap();
     let spec: DesignSpec = parse(&source).unwrap();
-    let search = DesignSearch::new(&spec, &source).map_err(|error| error.to_string())?;
-    Ok(search.run(&|_| ()).unwrap())
+    DesignSearch::new(&spec, &source).map_err(|error| error.to_string())
+}
+
+fn by_outcome(goals: &str, limits: &str) -> Result<DesignStudy, String> {
+    search_by_journeys(goals, limits).map(|search| run(&search))
+}
+
+#[test]
+fn a_stopped_search_continues_with_its_finished_journeys() {
+    let search =
+        search_by_journeys("(measure: fraction_seen_1s, aim: most), (measure: sag_mm, aim: least)", "").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let run_until = |stop_at: f64| {
+        let stop = AtomicBool::new(false);
+        let on_progress = |fraction: f64| stop.store(fraction >= stop_at, Ordering::Relaxed);
+        let program = Path::new(env!("CARGO_BIN_EXE_zsim"));
+        search.run(folder.path(), false, &Runner { program, stop: &stop, on_progress: &on_progress })
+    };
+    let parts = || -> BTreeMap<PathBuf, SystemTime> {
+        let parts = std::fs::read_dir(folder.path().join("journeys/parts")).unwrap().map(|part| part.unwrap());
+        parts.map(|part| (part.path(), part.metadata().unwrap().modified().unwrap())).collect()
+    };
+    assert!(run_until(0.3).is_err_and(|error| error.is_stopped()));
+    let before = parts();
+    assert!((1..6).contains(&before.len()), "{before:?}");
+    let continued = run_until(2.0).unwrap();
+    let after = parts();
+    assert_eq!(after.len(), 6, "three standing springs with two seeds");
+    assert!(before.iter().all(|(part, time)| after.get(part) == Some(time)), "finished journeys are used again");
+    assert_eq!(continued, run(&search));
+    let other = search_by_journeys("(measure: gyro_range_left, aim: most)", "").unwrap();
+    let runner = Runner { program: Path::new(""), stop: &AtomicBool::new(false), on_progress: &|_| () };
+    let error = other.run(folder.path(), false, &runner).unwrap_err().to_string();
+    assert!(error.contains("another"), "{error}");
 }
 
 #[test]
@@ -233,7 +277,7 @@ fn no_candidate_of_three_briefs_clashes_and_all_can_be_ordered() {
         let mut spec = DesignSpec { evaluations: 600, candidates: 3, ..brief };
         spec.shake.pitch_deg = pitch_deg;
         spec.limits.clear();
-        let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+        let study = run(&DesignSearch::new(&spec, &source).unwrap());
         assert!(!study.candidates.is_empty(), "{name}: {:?}", study.rejected);
         for design in &study.candidates {
             let coil = &design.candidate.coil;
@@ -297,7 +341,7 @@ fn each_limit_rejects_what_it_names() {
         ("fatigue_margin", |build| build.fatigue_margin = 20.0),
     ];
     for (limit, change) in cases {
-        let count = |rejected: &std::collections::BTreeMap<String, usize>| rejected.get(limit).copied().unwrap_or(0);
+        let count = |rejected: &BTreeMap<String, usize>| rejected.get(limit).copied().unwrap_or(0);
         let counts = changed(change);
         assert!(count(&counts) > count(&without), "{limit}: {counts:?}");
     }
@@ -318,7 +362,7 @@ fn a_material_without_strength_is_searched_and_its_unchecked_limits_are_named() 
         assert!(error.contains(&format!("{goal} needs the {missing} of the material")), "{error}");
     }
     spec.goals.retain(|goal| goal.measure.key() == "rocking_hz");
-    let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+    let study = run(&DesignSearch::new(&spec, &source).unwrap());
     let [design] = &study.candidates[..] else { panic!("{:?}", study.rejected) };
     assert_eq!(design.unchecked, ["yield_margin", "stress_share", "fatigue_margin"]);
     assert_eq!((design.simulated.fatigue_margin, design.simulated.margins.yielding), (None, None));
@@ -338,7 +382,7 @@ fn limits_that_a_cable_makes_unknown_are_named() {
     let mut spec =
         DesignSpec { head: "backpack".to_owned(), evaluations: 300, candidates: 1, limits: Vec::new(), ..spec };
     spec.goals.retain(|goal| goal.measure.key() == "rocking_hz");
-    let study = DesignSearch::new(&spec, &source).unwrap().run(&|_| ()).unwrap();
+    let study = run(&DesignSearch::new(&spec, &source).unwrap());
     let [design] = &study.candidates[..] else { panic!("{:?}", study.rejected) };
     assert_eq!(design.simulated.margins.clash, None);
     for limit in ["clash_margin", "yield_margin", "fatigue_margin"] {

@@ -8,11 +8,12 @@ use super::space::Space;
 use super::spec::{CoilDesign, DesignSpec};
 use super::verified::{Outcomes, Rejection, VerifiedDesign};
 use crate::StudyError;
-use crate::sweep::{Measure, check_folder_name, pareto_set, spread};
+use crate::sweep::{Measure, Runner, check_folder_name, pareto_set, spread};
 use rand::RngExt;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::Path;
 use zsim_base::parallel::OnProgress;
 use zsim_base::parallel::PieceProgress;
 use zsim_base::random::Seed;
@@ -45,6 +46,13 @@ pub struct DesignStudy {
     pub cloud: Vec<(f64, f64)>,
 }
 
+impl DesignSpec {
+    /// Whether `folder` has the journeys of an interrupted or finished search.
+    pub fn has_journeys_in(&self, folder: &Path) -> bool {
+        self.journey.is_some() && folder.join(JOURNEYS).is_dir()
+    }
+}
+
 impl DesignStudy {
     /// The measures that the candidates have of their journeys.
     pub fn journey_measures(&self) -> Vec<Measure> {
@@ -72,6 +80,9 @@ pub struct DesignSearch {
     space: Space,
     journeys: Option<Journeys>,
 }
+
+/// Folder of the journeys.
+const JOURNEYS: &str = "journeys";
 
 /// Number of runs of CMA-ES, each with different weights of the goals.
 const OPTIMISER_RUNS: usize = 16;
@@ -202,16 +213,22 @@ impl DesignSearch {
     /// Explores the design space and verifies a selection of the Pareto set.
     ///
     /// A design that is outside the limits in the simulation is replaced by another one of the set. The first part of the
-    /// progress is the exploration, the second the simulations.
+    /// progress is the exploration, the second the simulations. Journeys are a [`Sweep`](crate::sweep::Sweep) in
+    /// `folder/journeys`, which an interrupted search continues; `anew` permits to replace that of another search.
     ///
     /// # Errors
-    /// When the simulations cannot be set up.
-    pub fn run(&self, on_progress: OnProgress<'_>) -> Result<DesignStudy, StudyError> {
+    /// When the simulations cannot be set up, when the search is stopped, or when `folder` has the journeys of another search
+    /// or cannot be written.
+    pub fn run(&self, folder: &Path, anew: bool, runner: &Runner<'_>) -> Result<DesignStudy, StudyError> {
+        let on_progress = runner.on_progress;
         let explored = if self.journeys.is_some() { EXPLORED_WITH_JOURNEYS } else { EXPLORED };
         let mut found = self.explore(&|fraction| on_progress(explored * fraction));
         let simulating = |fraction| on_progress(explored + (1.0 - explored) * fraction);
         let outcomes = match &self.journeys {
-            Some(journeys) => self.outcomes(journeys, &found.feasible, &simulating)?,
+            Some(journeys) => {
+                let runner = Runner { on_progress: &simulating, ..*runner };
+                self.outcomes(journeys, &found.feasible, &folder.join(JOURNEYS), anew, &runner)?
+            }
             None => self.verified_front(&found.feasible, &simulating)?,
         };
         found.rejections.extend(outcomes.rejections);

@@ -92,9 +92,7 @@ impl Experiment {
             return Ok(result);
         }
         let result = match &self.spec {
-            ExperimentSpec::GainCurves(spec) => {
-                gain_curves::run(spec, &spec.heads(&self.source)?, extent, folder, anew, runner)?
-            }
+            ExperimentSpec::GainCurves(spec) => gain_curves::run(spec, &self.source, extent, folder, anew, runner)?,
             ExperimentSpec::Latency(spec) => {
                 let (sweep, report) = self.run_study(spec.study(extent, &self.source)?, folder, anew, runner)?;
                 timing::result(&spec.figure, &report.latency.ok_or_else(|| sweep.failed())?, folder)?

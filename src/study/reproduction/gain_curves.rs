@@ -3,9 +3,7 @@
 use super::head_response::HeadResponse;
 use super::{DampingFit, ExperimentResult, Extent, FittedPeak, GainCurvesSpec, fit_damping, gain_plots};
 use crate::StudyError;
-use crate::sweep::{
-    AxisSpec, BaseSpec, ComparedNumber, Comparison, Measure, Plan, Runner, Sampling, Setting, Shard, SweepSpec,
-};
+use crate::sweep::{AxisSpec, BaseSpec, ComparedNumber, Comparison, Measure, Plan, Runner, Setting, Shard, SweepSpec};
 use rayon::prelude::*;
 use std::path::Path;
 use zsim_base::files::FileError;
@@ -19,20 +17,21 @@ use zsim_motion::Axis;
 /// Fits the damping of the heads, measures their gains, draws figures, and compares with the paper.
 pub(super) fn run(
     spec: &GainCurvesSpec,
-    heads: &[HeadSpec],
+    source: &Source,
     extent: Extent,
     folder: &Path,
     anew: bool,
     runner: &Runner,
 ) -> Result<ExperimentResult, StudyError> {
-    let fitted = spec.designs.par_iter().zip(heads).map(|(design, head)| {
+    let heads = spec.heads(source)?;
+    let fitted = spec.designs.par_iter().zip(&heads).map(|(design, head)| {
         let source = Source::in_memory(design.head.clone(), "");
         fit_damping(head, &source, &design.peaks, spec.ratios, spec.up_to_hz)
     });
     let fitted: Vec<DampingFit> = fitted.collect::<Result<_, StudyError>>()?;
     let damped: Vec<HeadSpec> =
         heads.iter().zip(&fitted).map(|(head, fit)| with_damping(head, fit.damping_ratio)).collect();
-    let sweep = plan(spec, &damped, extent)?.write(folder, anew)?;
+    let sweep = plan(spec, &damped, extent, source)?.write(folder, anew)?;
     sweep.run(Shard::WHOLE, runner)?;
     sweep.merge_and_report()?;
     let curves: Vec<GainCurve> = sweep.details()?.ok_or_else(|| sweep.failed())?;
@@ -54,7 +53,7 @@ pub(super) fn run(
 }
 
 /// The sweep over the heads and the axes.
-fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent) -> Result<Plan, StudyError> {
+fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent, source: &Source) -> Result<Plan, StudyError> {
     let full = GainPlan::default();
     let (realisations, period_s, longest_settling_s) = match extent {
         Extent::Whole => (full.realisations, full.period_s, full.longest_settling_s),
@@ -64,27 +63,14 @@ fn plan(spec: &GainCurvesSpec, damped: &[HeadSpec], extent: Extent) -> Result<Pl
     let heads = spec.designs.iter().zip(damped);
     let heads: Vec<Named<HeadSpec>> =
         heads.map(|(design, head)| Named::in_memory(design.letter.clone(), head.clone())).collect();
-    let axis = |path: &str, values: Vec<Setting>| AxisSpec::Values {
-        path: path.to_owned(),
-        values,
-        first_share: None,
-        name: None,
-    };
     let letters = heads.iter().map(|head| Setting::Text(head.name.clone())).collect();
     let axes = AXES.iter().map(|axis| Setting::Text(format!("{axis:?}"))).collect();
     let sweep = SweepSpec {
-        name: None,
-        base: BaseSpec::Gains { head: spec.designs[0].letter.clone(), gains },
-        axes: vec![axis("head", letters), axis("gains.axis", axes)],
-        sampling: Sampling::Grid,
-        seeds: Vec::new(),
+        axes: vec![AxisSpec::values("head", letters), AxisSpec::values("gains.axis", axes)],
         measures: vec![Measure::PEAK_GAIN],
-        by: None,
-        front: Vec::new(),
-        limits: Vec::new(),
-        claims: Vec::new(),
+        ..SweepSpec::of(BaseSpec::Gains { head: spec.designs[0].head.clone(), gains })
     };
-    Plan::of_gains(&format!("figure {}", spec.figure), &sweep, gains, heads)
+    Plan::with_heads(&format!("figure {}", spec.figure), &sweep, &heads, source)
 }
 
 /// Compares the peaks with the paper's.

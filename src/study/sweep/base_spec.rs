@@ -94,6 +94,27 @@ impl BaseSpec {
 }
 
 impl JourneySpec {
+    /// The usual journey in a scene.
+    pub(crate) fn in_scene(scene: &str) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            head: usual::head(),
+            motion: usual::motion(),
+            lidar: usual::lidar(),
+            imu: usual::imu(),
+            clock: usual::clock(),
+            faults: None,
+            base_imu: None,
+            estimator: usual::estimator(),
+            timing: None,
+            reference: None,
+            ignore_manifest: false,
+            route: None,
+            duration_s: usual::duration_s(),
+            limit: LimitSpec::default(),
+        }
+    }
+
     /// The journey with another scenario and estimator.
     #[must_use]
     pub fn in_scenario(self, new: Scenario, estimator: &str) -> Self {

@@ -61,6 +61,7 @@ pub use judge::ComparedNumber;
 pub use measure::Measure;
 pub(super) use measure::{figures, needs};
 pub use merge::SweepStatus;
+pub(crate) use outcome::Figures;
 pub use pareto::{pareto_set, spread};
 pub use plan::Plan;
 pub(crate) use plan::check_folder_name;

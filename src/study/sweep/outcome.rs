@@ -26,6 +26,9 @@ pub(super) enum Stored {
     Missing,
 }
 
+/// Figures of a run, one per measure; `None` if it could not be computed.
+pub(crate) type Figures = Vec<Option<f64>>;
+
 /// Outcome of a run: a row of the tables.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct RunOutcome {
@@ -78,6 +81,19 @@ impl Sweep {
     pub(super) fn read_batch(&self, batch: &Batch) -> Result<Stored, StudyError> {
         let Some(file) = open(&self.batch_path(batch))? else { return Ok(Stored::Missing) };
         Ok(read_intact(file, batch, &self.plan.time_measures()).map_or(Stored::Damaged, Stored::Done))
+    }
+
+    /// The figures of the table, or the error, of each run in the order of the plan.
+    ///
+    /// # Errors
+    /// If a run is missing, or if a file cannot be opened.
+    pub(crate) fn outcomes(&self) -> Result<Vec<Result<Figures, String>>, StudyError> {
+        let mut all = Vec::new();
+        for batch in &self.batches {
+            let Stored::Done(outcomes) = self.read_batch(batch)? else { return Err(self.failed()) };
+            all.extend(outcomes.into_iter().map(|outcome| outcome.error.map_or(Ok(outcome.figures), Err)));
+        }
+        Ok(all)
     }
 
     /// Details of all runs in the order of the plan; `None` if a run failed, is missing, or has no details.

@@ -4,12 +4,11 @@ use super::axis::{Axis, Level, SpecSet};
 use super::check::{MAX_RUNS, check};
 use super::design::{AxisSize, Design};
 use super::identity::{ContentHash, InputHashes, input_hashes, is_after_recording};
-use super::tree::{GainRun, Tree};
+use super::tree::Tree;
 use super::{BaseSpec, JourneySpec, LimitSpec, Measure, Setting, SweepSpec};
 use crate::StudyError;
 use zsim_base::spec::{Kind, Named, NamedSpec, Source, SpecError, parse_named, to_json};
 use zsim_dynamics::HeadSpec;
-use zsim_head::gains::GainsSpec;
 use zsim_run::RunInputs;
 use zsim_simulation::Simulation;
 
@@ -50,21 +49,19 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The plan of gains of `heads`, which axes refer to by name; the first is that of the base run.
+    /// The plan of runs with `heads`, which the axes of `spec`, read from `source`, refer to by name.
     ///
     /// # Errors
-    /// If the spec is invalid.
-    pub(crate) fn of_gains(
+    /// If the spec, or one that its base run names, is missing or invalid.
+    pub(crate) fn with_heads(
         name: &str,
         spec: &SweepSpec,
-        gains: GainsSpec,
-        heads: Vec<Named<HeadSpec>>,
+        heads: &[Named<HeadSpec>],
+        source: &Source,
     ) -> Result<Self, StudyError> {
         let named = heads.iter().map(|head| Ok((format!("head/{}", head.name), to_json(head)?)));
         let named = named.collect::<Result<_, StudyError>>()?;
-        let base =
-            heads.into_iter().next().map_or_else(|| Ok(Tree::default()), |head| Tree::of(&GainRun { gains, head }))?;
-        Self::with_specs(name, spec, &mut SpecSet { base, named }, &Source::in_memory(name, ""))
+        Self::with_specs(name, spec, &mut SpecSet { base: Tree::load(&spec.base, source)?, named }, source)
     }
 
     /// Builds the plan from specs that are loaded already.

@@ -141,6 +141,22 @@ pub enum Sampling {
 }
 
 impl SweepSpec {
+    /// A grid over no axis of a base run, without seeds and measures.
+    pub(crate) fn of(base: BaseSpec) -> Self {
+        Self {
+            name: None,
+            base,
+            axes: Vec::new(),
+            sampling: Sampling::Grid,
+            seeds: Vec::new(),
+            measures: Vec::new(),
+            by: None,
+            front: Vec::new(),
+            limits: Vec::new(),
+            claims: Vec::new(),
+        }
+    }
+
     /// The sweep with the seeds and measures that its base run has by default, where the spec has none.
     pub(super) fn with_usual_values(mut self) -> Self {
         let (seeds, measures): (&[u64], &[Measure]) = match self.base {
@@ -159,6 +175,11 @@ impl SweepSpec {
 }
 
 impl AxisSpec {
+    /// An axis with these values of the setting `path`.
+    pub(crate) fn values(path: &str, values: Vec<Setting>) -> Self {
+        Self::Values { path: path.to_owned(), values, first_share: None, name: None }
+    }
+
     /// Name of the column.
     pub fn name(&self) -> &str {
         let (path, name) = match self {
