@@ -63,6 +63,7 @@ mod clock;
 mod cloud;
 mod coasting;
 mod consider;
+mod correlation;
 mod dead_reckoning;
 mod displacement;
 mod error;

@@ -3,15 +3,24 @@
 use super::alignment::{ALIGNED_LEVELS, Alignment, Fit, NodeSurfels, agreement, align};
 use super::database::PlaceDatabase;
 use super::scan_context::{self, Context};
-use super::{LoopReport, MATCHING_REACH, RelativePose, correlation};
+use super::{LoopReport, MATCHING_REACH, RelativePose};
 use crate::PlacesSpec;
+use crate::correlation::{self, Region};
 use crate::matching::Matcher;
 use rayon::prelude::*;
+use zsim_base::geometry::{Pose, Rotation, Vector};
 
 /// Maximum distance of two views of one node, m: up to it the descriptors stay similar.
 const MAX_VIEW_DISTANCE_M: f64 = 3.0;
-/// Number of start alignments per pair.
-const START_ALIGNMENTS: usize = 3;
+/// Region of the start alignments: translations up to the distance of two views of one node and headings up to 9 degrees, more than
+/// one sector of the descriptor, among the surfaces within the range of the descriptor; a few for each pair.
+const START_ALIGNMENTS: Region = Region {
+    grid_m: (20.0, f64::INFINITY),
+    search_m: (MAX_VIEW_DISTANCE_M, 0.0),
+    headings: (-2, 2),
+    up: (1, 0),
+    candidates: (3, 3),
+};
 /// Alignments that differ by less than this, m and rad, are equal.
 const SAME_ALIGNMENT: (f64, f64) = (0.5, 0.1);
 /// The best alignment is ambiguous if a different one has more than this fraction of the agreement.
@@ -143,8 +152,12 @@ impl LoopSearch<'_> {
     /// Registers two nodes; `None` if the agreement is insufficient or ambiguous.
     fn verify(&self, late: &NodeSurfels, early: &NodeSurfels, nodes: NodePair, yaw: f64) -> Option<Fit> {
         let ground_m = |node: usize| self.database.nodes[node].ground_m;
-        let up_m = ground_m(nodes.early) - ground_m(nodes.late);
-        let mut starts = correlation::start_alignments(late.finest(), early.finest(), yaw, up_m, START_ALIGNMENTS);
+        let up = Vector::z() * (ground_m(nodes.early) - ground_m(nodes.late));
+        let here = Pose::from_parts(up.into(), Rotation::from_scaled_axis(Vector::z() * yaw));
+        let (early_surfaces, late_surfaces) = (early.finest(), late.finest());
+        let found = correlation::candidates(early_surfaces, late_surfaces, &Vector::zeros(), &here, START_ALIGNMENTS);
+        let mut starts: Vec<Alignment> =
+            found.into_iter().map(|by| Alignment { yaw: yaw + by.yaw, shift: up + by.shift }).collect();
         starts.push(self.current_alignment(nodes));
         let register = |start: &Alignment| {
             let fit = align(late, early, start, self.matcher)?;

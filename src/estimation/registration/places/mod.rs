@@ -6,14 +6,13 @@
 //!    relative pose within the maximum drift of the open loop. A k-d tree returns a fixed number per node, so their number
 //!    grows linearly with the recording.
 //! 3. A pair that agrees at the open-loop pose needs no loop closure. This test is cheap, and all that runs without drift need.
-//! 4. Other pairs are registered plane to plane from several starts (`correlation`, `alignment`). A loop is *verified* if
+//! 4. Other pairs are registered plane to plane from several starts (`crate::correlation`, `alignment`). A loop is *verified* if
 //!    enough surfaces agree in every direction and no different alignment is nearly as good; this rejects repetitive surroundings.
 //! 5. A pose graph (`pose_graph`) connects the verified loops with the relative poses of successive nodes. Loops that
 //!    contradict these are removed as outliers. Drift also distorts the nodes, so the steps are repeated until convergence.
 //!    The remaining loops that exceed the matching distance are *closed*; if there are too few, the open loop is kept.
 
 mod alignment;
-mod correlation;
 mod database;
 mod loop_search;
 mod pose_graph;

@@ -24,7 +24,7 @@ const HEIGHT_OFFSET_M: f64 = 0.5;
 const MIN_COMMON_SECTORS: f64 = 0.3;
 
 /// Whether a patch is vertical: a wall, a trunk, a side of furniture.
-pub(super) fn is_wall(patch: &Patch) -> bool {
+fn is_wall(patch: &Patch) -> bool {
     patch.normal.z.abs() < MAX_WALL_NORMAL_Z
 }
 
