@@ -15,6 +15,8 @@ pub(super) struct Nominal {
     /// Measured angular velocity at the nodes, including the bias, in the IMU frame, rad/s.
     rates: Vec<Vector>,
     intervals: Vec<Interval>,
+    /// Rotation vector from the start to the end of each interval, which each pose within it needs.
+    turns: Vec<Vector>,
 }
 
 /// Pose, velocity and angular velocity of the IMU at a time, in the map frame.
@@ -29,7 +31,8 @@ pub(super) struct Motion {
 impl Nominal {
     /// A trajectory that starts at `start_s` with `state`.
     pub(super) fn starting(start_s: f64, state: State) -> Self {
-        Self { times_s: vec![start_s], states: vec![state], rates: vec![Vector::zeros()], intervals: Vec::new() }
+        let (intervals, turns) = (Vec::new(), Vec::new());
+        Self { times_s: vec![start_s], states: vec![state], rates: vec![Vector::zeros()], intervals, turns }
     }
 
     pub(super) fn times_s(&self) -> &[f64] {
@@ -68,6 +71,14 @@ impl Nominal {
         }
         self.rates.push(interval.gyro + half_slope);
         self.intervals.push(interval);
+        self.update_turns_from(self.turns.len());
+    }
+
+    /// Computes the turn of each interval from `first` on.
+    fn update_turns_from(&mut self, first: usize) {
+        self.turns.truncate(first);
+        let turn = |ends: &[State]| (ends[0].rotation.inverse() * ends[1].rotation).scaled_axis();
+        self.turns.extend(self.states[first..].windows(2).map(turn));
     }
 
     /// Removes the nodes before `time_s`, except the last one at or before it.
@@ -77,6 +88,7 @@ impl Nominal {
         self.states.drain(..keep);
         self.rates.drain(..keep);
         self.intervals.drain(..keep);
+        self.turns.drain(..keep);
     }
 
     /// Adds a correction spline to the nodes from `first` on: `R' = exp(dr) R`, `t' = t + dt` (Bosse et al. 2012, eq. 1-2).
@@ -90,6 +102,7 @@ impl Nominal {
             state.position += correction.translation; // eq. (2)
             state.velocity += correction.velocity;
         }
+        self.update_turns_from(first.saturating_sub(1));
     }
 
     /// Corrects the stored readings for scale errors and misalignments; the states do not change.
@@ -109,6 +122,7 @@ impl Nominal {
             state.position = pivot + rotation * (state.position - pivot);
             state.velocity = rotation * state.velocity;
         }
+        self.update_turns_from(0);
     }
 
     /// Transforms the trajectory by `a_from_b`.
@@ -118,6 +132,7 @@ impl Nominal {
             state.position = a_from_b.rotation * state.position + a_from_b.translation.vector;
             state.velocity = a_from_b.rotation * state.velocity;
         }
+        self.update_turns_from(0);
     }
 
     /// Pose and velocities at `u_s`, trajectory time; constant before the first and after the last node.
@@ -147,7 +162,7 @@ impl Nominal {
         let x = ((u_s - self.times_s[k]) / h).clamp(0.0, 1.0);
         let (h10, h01, h11) = (x * (1.0 - x) * (1.0 - x), x * x * (3.0 - 2.0 * x), x * x * (x - 1.0));
         let position = a.position + (b.position - a.position) * h01 + (a.velocity * h10 + b.velocity * h11) * h;
-        let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
+        let turn = self.turns[k];
         let (rate_a, rate_b) = (self.rates[k] - gyro_bias, self.rates[k + 1] - gyro_bias);
         // Derivative of the rotation vector at the end: J_r(turn)^-1 rate ~ rate + turn x rate / 2, for a small rotation.
         let rate_end = rate_b + turn.cross(&rate_b) * 0.5;
