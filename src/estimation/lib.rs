@@ -94,6 +94,7 @@ mod strapdown;
 mod surfel;
 mod timing;
 mod unknowns;
+mod vectorised;
 mod views;
 mod window;
 

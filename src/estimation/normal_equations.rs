@@ -5,7 +5,7 @@
 //! factorisation causes no fill-in outside the envelope (George and Liu 1981). So a band matrix, a dense border and a
 //! full triangle each cost only the necessary work.
 
-use pulp::Arch;
+use crate::vectorised::vectorised;
 
 /// `H x = b`, with `H` symmetric and positive definite.
 #[derive(Debug, Clone)]
@@ -78,7 +78,7 @@ impl NormalEquations {
         into.size = self.size;
         into.first.clone_from(&self.first);
         into.l.clone_from(&self.h);
-        Arch::new().dispatch(|| into.decompose())
+        vectorised!(into.decompose())
     }
 
     /// The solution, with the factor of these equations.

@@ -4,7 +4,7 @@
 
 use crate::layout::{GYRO_MATRIX, Layout, RANGE};
 use crate::normal_equations::NormalEquations;
-use pulp::Arch;
+use crate::vectorised::vectorised;
 
 /// Maximum number of knots that a residual depends on.
 pub(super) const KNOTS: usize = 6;
@@ -69,7 +69,7 @@ impl ResidualSums {
             self.flush_to(equations, layout);
             self.first = Some(row.first);
         }
-        Arch::new().dispatch(|| self.add_products(&row.by, residual, weight));
+        vectorised!(self.add_products(&row.by, residual, weight));
     }
 
     #[inline(always)]

@@ -8,6 +8,7 @@ use super::{Surfel, TimedReturn};
 use crate::nominal::{Motion, Nominal};
 use crate::spec::SurfelSpec;
 use crate::unknowns::Unknowns;
+use crate::vectorised::vectorised;
 use rayon::prelude::*;
 use zsim_base::geometry::{Matrix, Vector};
 use zsim_base::measurement::{LidarCorrection, LidarNoise};
@@ -77,7 +78,8 @@ impl SurfelBuilder {
             .into_par_iter()
             .map(|k| {
                 let (edge_m, shift) = (edges_m[k / 2], 0.5 * (k % 2) as f64);
-                self.fragments(returns, &points, &origin, (edge_m, shift * edge_m))
+                let grid = (edge_m, shift * edge_m);
+                vectorised!(self.fragments(returns, &points, &origin, grid))
             })
             .collect();
         let min_points = if detail == Detail::Fine { self.spec.fine.min_points } else { self.spec.min_points };
@@ -113,32 +115,38 @@ impl SurfelBuilder {
     ) -> Vec<Vector> {
         let mut cursor = 0;
         let mut pose = |tau_s: f64| nominal.at_cursor(&mut cursor, clock.trajectory_s(tau_s), &biases.gyro);
-        let mut runs: Vec<(&[TimedReturn], [Motion; 2])> = Vec::new();
-        let mut rest = returns;
+        let mut points = vec![Vector::zeros(); returns.len()];
+        let mut runs: Vec<(&[TimedReturn], [Motion; 2], &mut [Vector])> = Vec::new();
+        let (mut rest, mut rest_of_points) = (returns, &mut points[..]);
         while let Some(first) = rest.first() {
             let end_s = first.tau_s + POSE_SPACING_S;
-            let count = rest.iter().position(|beam| beam.tau_s >= end_s).unwrap_or(rest.len());
-            let (run, later) = rest.split_at(count.max(1));
-            runs.push((run, [pose(first.tau_s), pose(end_s)]));
-            rest = later;
+            let count = rest.iter().position(|beam| beam.tau_s >= end_s).unwrap_or(rest.len()).max(1);
+            let (run, later) = rest.split_at(count);
+            let (points_of_run, later_points) = rest_of_points.split_at_mut(count);
+            runs.push((run, [pose(first.tau_s), pose(end_s)], points_of_run));
+            (rest, rest_of_points) = (later, later_points);
         }
         let lidar_rotation = lidar.rotation.to_rotation_matrix();
         let laser_in_imu = self.laser_in_imu + lidar.translation;
-        let points = |(run, [a, b]): &(&[TimedReturn], [Motion; 2])| -> Vec<Vector> {
-            let point = |beam: &TimedReturn| {
-                let x = (beam.tau_s - run[0].tau_s) / POSE_SPACING_S;
-                let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
-                let position = a.position.lerp(&b.position, x);
-                let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
-                let ray = lidar_rotation * (ray * (1.0 + lidar.range_m / f64::from(beam.range_m)));
-                rotation * (laser_in_imu + ray) + position
-            };
-            run.iter().map(point).collect()
-        };
-        runs.par_iter().with_min_len(128).flat_map_iter(points).collect()
+        runs.par_chunks_mut(128).for_each(|runs| {
+            vectorised!({
+                for (run, [a, b], points) in runs.iter_mut() {
+                    for (beam, point) in run.iter().zip(points.iter_mut()) {
+                        let x = (beam.tau_s - run[0].tau_s) / POSE_SPACING_S;
+                        let rotation: Matrix = a.rotation + (b.rotation - a.rotation) * x;
+                        let position = a.position.lerp(&b.position, x);
+                        let ray = beam.point_in_imu.cast::<f64>() - self.laser_in_imu;
+                        let ray = lidar_rotation * (ray * (1.0 + lidar.range_m / f64::from(beam.range_m)));
+                        *point = rotation * (laser_in_imu + ray) + position;
+                    }
+                }
+            });
+        });
+        points
     }
 
     /// The fragments of the returns at `points` in a grid of cells of `edge_m`, offset by `shift_m`, in order of time.
+    #[inline(always)]
     fn fragments(
         &self,
         returns: &[TimedReturn],

@@ -8,9 +8,9 @@ use crate::layout::{LIDAR_ROTATION, Layout};
 use crate::residual::matched::{self, SurfelJacobian};
 use crate::residual::prior::ByLidar;
 use crate::spline::Basis;
+use crate::vectorised::vectorised;
 use crate::views::Views;
 use nalgebra::{Matrix6, SMatrix};
-use pulp::Arch;
 use rayon::prelude::*;
 use zsim_base::geometry::Vector;
 
@@ -25,7 +25,7 @@ impl Window {
         at: &Linearised,
         views: &Views,
     ) -> [Option<Sensitivity>; T] {
-        let by_views = Arch::new().dispatch(|| self.columns_of_views(at, views));
+        let by_views = vectorised!(self.columns_of_views(at, views));
         let mut found = [const { None }; T];
         let of_times = found.par_iter_mut().zip(times_s);
         of_times.for_each(|(found, u_s)| *found = self.sensitivity_at(u_s, at, &by_views));
