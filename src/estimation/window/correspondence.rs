@@ -1,10 +1,10 @@
 //! Surfel matching: pairs within the window, and window surfels with patches of the fixed views.
 
+use crate::layout::Layout;
 use crate::matching::Matcher;
 use crate::residual::matched::Plane;
 use crate::surfel::{Patch, PlacedSurfel};
 use crate::views::Views;
-use rayon::prelude::*;
 use zsim_base::geometry::Vector;
 
 /// The neighbour search is repeated when a surfel may have moved by this, m; smaller motion hardly changes the result.
@@ -57,21 +57,23 @@ pub(super) enum Counterpart {
 #[derive(Debug, Default)]
 pub(super) struct Matches {
     pub all: Vec<Match>,
+    /// The matches of each surfel of the scene.
+    pub of_surfels: Grouped,
     /// The matched surfels of the scene, by the span between knots in which they were measured.
-    pub spans: Grouped<i64>,
-    /// The matches of two live surfels, by the spans of the earlier and the later one.
-    pub couplings: Grouped<(i64, i64)>,
-    /// Indices of the matches of each surfel of the scene, one surfel after the other.
-    of_surfels: Vec<u32>,
-    /// Offset of each surfel's first match in `of_surfels`, then the offset of the end.
-    offsets: Vec<usize>,
+    pub spans: Grouped,
+    /// The matches of two live surfels, by the spans of the earlier and the later one: see [`Matches::pair`].
+    pub couplings: Grouped,
+    /// Index of the first knot, and number of spans.
+    knots: (i64, usize),
 }
 
-/// Indices in runs of one key each, in the order of keys.
-#[derive(Debug)]
-pub(super) struct Grouped<K> {
-    members: Vec<(K, u32)>,
-    ends: Vec<usize>,
+/// Indices in groups, one for each key from 0 on.
+#[derive(Debug, Default)]
+pub(super) struct Grouped {
+    /// The indices, one group after the other.
+    members: Vec<u32>,
+    /// Offset of each group in the members, then the offset of the end.
+    offsets: Vec<usize>,
 }
 
 impl Match {
@@ -81,66 +83,60 @@ impl Match {
     }
 }
 
-impl<K: Ord> Grouped<K> {
-    fn of(mut members: Vec<(K, u32)>) -> Self {
-        members.sort_unstable();
-        let ends = members.chunk_by(|a, b| a.0 == b.0).scan(0, |end, run| {
-            *end += run.len();
-            Some(*end)
-        });
-        Self { ends: ends.collect(), members }
+impl Grouped {
+    /// Groups the indices of `keyed` by their keys, which are below `keys`; in a group they keep their order.
+    fn of(keyed: impl Iterator<Item = (usize, u32)> + Clone, keys: usize) -> Self {
+        let mut offsets = vec![0; keys + 1];
+        keyed.clone().for_each(|(key, _)| offsets[key + 1] += 1);
+        (0..keys).for_each(|key| offsets[key + 1] += offsets[key]);
+        let (mut next, mut members) = (offsets.clone(), vec![0; offsets[keys]]);
+        for (key, index) in keyed {
+            members[next[key]] = index;
+            next[key] += 1;
+        }
+        Self { members, offsets }
     }
-}
 
-impl<K> Default for Grouped<K> {
-    fn default() -> Self {
-        Self { members: Vec::new(), ends: Vec::new() }
+    /// Returns the keys that have indices, in order.
+    pub fn used(&self) -> Vec<usize> {
+        (1..self.offsets.len()).map(|end| end - 1).filter(|key| !self.group(*key).is_empty()).collect()
     }
-}
 
-impl<K: Copy + Send + Sync> Grouped<K> {
-    /// Iterates over the key and the indices of each run.
-    pub fn par_iter(&self) -> impl IndexedParallelIterator<Item = (K, impl Iterator<Item = usize>)> {
-        (0..self.ends.len()).into_par_iter().map(|k| {
-            let from = k.checked_sub(1).map_or(0, |before| self.ends[before]);
-            let run = &self.members[from..self.ends[k]];
-            (run[0].0, run.iter().map(|(_, index)| *index as usize))
-        })
+    /// Returns the indices of a key.
+    pub fn group(&self, key: usize) -> &[u32] {
+        &self.members[self.offsets[key]..self.offsets[key + 1]]
     }
 }
 
 impl Matches {
-    pub fn of(all: Vec<Match>, scene: &[PlacedSurfel]) -> Self {
-        let mut offsets = vec![0; scene.len() + 1];
-        let sides = |one: &Match| [Some(one.a as usize), one.other()];
-        for surfel in all.iter().flat_map(sides).flatten() {
-            offsets[surfel + 1] += 1;
-        }
-        for surfel in 0..scene.len() {
-            offsets[surfel + 1] += offsets[surfel];
-        }
-        let mut next = offsets.clone();
-        let mut of_surfels = vec![0; offsets[scene.len()]];
-        for (index, one) in all.iter().enumerate() {
-            for surfel in sides(one).into_iter().flatten() {
-                of_surfels[next[surfel]] = index as u32;
-                next[surfel] += 1;
-            }
-        }
-        let span = |surfel: usize| scene[surfel].basis.first;
-        let matched = (0..scene.len()).filter(|surfel| offsets[*surfel] < offsets[surfel + 1]);
-        let spans = || Grouped::of(matched.map(|surfel| (span(surfel), surfel as u32)).collect());
-        let coupled = all.iter().enumerate().filter_map(|(index, one)| {
-            let (a, b) = (span(one.a as usize), span(one.other()?));
-            Some(((a.min(b), a.max(b)), index as u32))
-        });
-        let (spans, couplings) = rayon::join(spans, || Grouped::of(coupled.collect()));
-        Self { spans, couplings, all, of_surfels, offsets }
+    /// Groups the matches of `scene`, of which all surfels are between the knots of `layout`.
+    pub fn of(all: Vec<Match>, scene: &[PlacedSurfel], layout: &Layout) -> Self {
+        let knots @ (first, count) = (layout.first_knot, layout.knots - 3);
+        let span_of: Vec<usize> = scene.iter().map(|surfel| (surfel.basis.first - first) as usize).collect();
+        let numbered = || (0..).zip(&all);
+        let sides = |(index, one): (u32, &Match)| {
+            let surfels = [Some(one.a as usize), one.other()];
+            surfels.into_iter().flatten().map(move |surfel| (surfel, index))
+        };
+        let coupled = |(index, one): (u32, &Match)| {
+            let (a, b) = (span_of[one.a as usize], span_of[one.other()?]);
+            Some((a.min(b) * count + a.max(b), index))
+        };
+        let of_surfels = Grouped::of(numbered().flat_map(sides), scene.len());
+        let matched = of_surfels.used().into_iter().map(|surfel| (span_of[surfel], surfel as u32));
+        let spans = Grouped::of(matched, count);
+        let couplings = Grouped::of(numbered().filter_map(coupled), count * count);
+        Self { all, of_surfels, spans, couplings, knots }
     }
 
-    /// Returns the matches of a surfel of the scene: indices into `all`.
-    pub fn of_surfel(&self, surfel: usize) -> &[u32] {
-        &self.of_surfels[self.offsets[surfel]..self.offsets[surfel + 1]]
+    /// Returns the first knots of the earlier and the later span of a key of the couplings.
+    pub fn pair(&self, key: usize) -> (i64, i64) {
+        (self.span(key / self.knots.1), self.span(key % self.knots.1))
+    }
+
+    /// Returns the first knot of a key of the spans.
+    pub fn span(&self, key: usize) -> i64 {
+        self.knots.0 + key as i64
     }
 
     pub fn planes(&self) -> impl Iterator<Item = &Plane> + Clone {

@@ -9,8 +9,8 @@ use crate::residual::sums::{Coupling, SpanSums, SurfelSums};
 use crate::spec::SolveSpec;
 use crate::spline::Basis;
 use crate::surfel::PlacedSurfel;
+use crate::vectorised::vectorised;
 use crate::views::Views;
-use pulp::Arch;
 use rayon::prelude::*;
 
 /// Buffers that all solves of a window share.
@@ -110,22 +110,29 @@ impl WeightedMatches<'_> {
     /// Sums run by run. The result has the same bits for any number of threads, and on all machines, because vector units
     /// of any width add in the same order.
     fn sums_by_span<const B: usize>(&self, weights: &[f64]) -> SumsBySpan<B> {
-        let spans = self.matches.spans.par_iter();
-        let spans = spans.map(|(span, surfels)| (span, Arch::new().dispatch(|| self.of_span::<B>(surfels, weights))));
-        let pairs = self.matches.couplings.par_iter();
-        let pairs = pairs.map(|(pair, matches)| (pair, Arch::new().dispatch(|| self.coupling::<B>(matches, weights))));
-        let (spans, pairs) = rayon::join(|| spans.collect(), || pairs.collect());
+        let matches = self.matches;
+        let of_span = |key: &usize| {
+            let surfels = matches.spans.group(*key);
+            (matches.span(*key), vectorised!(self.of_span::<B>(surfels, weights)))
+        };
+        let of_pair = |key: &usize| {
+            let coupled = matches.couplings.group(*key);
+            (matches.pair(*key), vectorised!(self.coupling::<B>(coupled, weights)))
+        };
+        let spans = || matches.spans.used().par_iter().map(of_span).collect();
+        let pairs = || matches.couplings.used().par_iter().map(of_pair).collect();
+        let (spans, pairs) = rayon::join(spans, pairs);
         SumsBySpan { spans, pairs }
     }
 
     /// The normal equations of all matches of the surfels of a span, by the motion of each surfel.
     #[inline(always)]
-    fn of_span<const B: usize>(&self, surfels: impl Iterator<Item = usize>, weights: &[f64]) -> SpanSums<B> {
+    fn of_span<const B: usize>(&self, surfels: &[u32], weights: &[f64]) -> SpanSums<B> {
         let mut sum = SpanSums::NONE;
-        for index in surfels {
+        for index in surfels.iter().map(|index| *index as usize) {
             let surfel = &self.scene[index];
             let mut own = SurfelSums::NONE;
-            for k in self.matches.of_surfel(index).iter().map(|k| *k as usize) {
+            for k in self.matches.of_surfels.group(index).iter().map(|k| *k as usize) {
                 let (one, weight) = (&self.matches.all[k], weights[k]);
                 let is_first = one.a as usize == index;
                 let side = self.side(one, is_first);
@@ -143,9 +150,9 @@ impl WeightedMatches<'_> {
 
     /// The off-diagonal block of some matches between two spans.
     #[inline(always)]
-    fn coupling<const B: usize>(&self, matches: impl Iterator<Item = usize>, weights: &[f64]) -> Coupling {
+    fn coupling<const B: usize>(&self, matches: &[u32], weights: &[f64]) -> Coupling {
         let mut sum = Coupling::NONE;
-        for k in matches {
+        for k in matches.iter().map(|k| *k as usize) {
             let one = &self.matches.all[k];
             let Some(other) = one.other() else { continue };
             let (a, b) = (&self.scene[one.a as usize], &self.scene[other]);

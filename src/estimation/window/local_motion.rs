@@ -40,7 +40,7 @@ impl Window {
     ) -> Option<LocalMotion> {
         let is_fixed = |one: &&Match| matches!(one.with, Counterpart::Fixed { .. });
         let fixed: Vec<_> = at.matches.all.iter().filter(is_fixed).copied().collect();
-        let matches = Matches::of(fixed, &at.scene);
+        let matches = Matches::of(fixed, &at.scene, &at.layout);
         let clock_reference_s = self.unknowns.clock.at_s;
         let (scene, robust) = (&at.scene, &at.robust);
         let weighted = WeightedMatches { scene, matches: &matches, views, robust, clock_reference_s, sign: -1.0 };

@@ -47,7 +47,7 @@ impl Window {
         views: &Views,
         neighbours: &Neighbours,
         iteration: usize,
-    ) -> Matches {
+    ) -> Vec<Match> {
         let widening = if self.wide_matching || self.bridged_gap { WIDE_GATE } else { 1.0 };
         let gate_m = widening * self.spec.matching.max_plane_distance_m * if iteration == 0 { 3.0 } else { 1.5 };
         let sigma_m = self.spec.solve.match_sigma_m;
@@ -75,8 +75,7 @@ impl Window {
         };
         let live = neighbours.pairs.par_chunks(CANDIDATES).map(live);
         let found: Vec<Vec<Match>> = live.chain(neighbours.fixed.par_chunks(CANDIDATES).map(fixed)).collect();
-        let all = found.concat();
-        Matches::of(all, scene)
+        found.concat()
     }
 
     /// Removes the component along `direction` from normals whose tilt towards it is within the normal error.

@@ -70,7 +70,7 @@ impl Window {
                 neighbours = self.search_neighbours(&scene, views, chosen);
             }
             solved.timing.neighbours_s += watch.lap_s();
-            let matches = self.match_up(&scene, views, &neighbours, iteration);
+            let matches = Matches::of(self.match_up(&scene, views, &neighbours, iteration), &scene, &layout);
             let robust = Robust::of(&self.spec.solve, iteration);
             solved.record(&matches, &robust, &scene);
             (solved.iterations, solved.surfels, solved.views) = (iteration + 1, scene.len(), chosen.len());
