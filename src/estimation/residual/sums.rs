@@ -18,25 +18,30 @@ use crate::surfel::PlacedSurfel;
 /// A surfel has several matches, and its motion depends on many unknowns: this intermediate sum keeps a match cheap.
 #[derive(Debug)]
 pub(crate) struct SurfelSums<const B: usize> {
-    square: [[f64; 6]; 6],
-    common: [[f64; 6]; B],
-    right: [f64; 6],
+    square: [[f64; WIDTH]; 6],
+    common: [[f64; WIDTH]; B],
+    right: [f64; WIDTH],
 }
+
+/// The six derivatives by the motion, and two zeros that fill the vector units.
+const WIDTH: usize = 8;
 
 impl<const B: usize> SurfelSums<B> {
     /// No match yet.
-    pub(crate) const NONE: Self = Self { square: [[0.0; 6]; 6], common: [[0.0; 6]; B], right: [0.0; 6] };
+    pub(crate) const NONE: Self = Self { square: [[0.0; WIDTH]; 6], common: [[0.0; WIDTH]; B], right: [0.0; WIDTH] };
 
     /// Adds a match with derivatives `side`.
     #[inline(always)]
     pub(crate) fn add(&mut self, side: &SurfelJacobian<B>, distance_m: f64, weight: f64) {
+        let [a, b, c, d, e, f] = side.own;
+        let own = [a, b, c, d, e, f, 0.0, 0.0];
         for (square, by) in self.square.iter_mut().zip(side.own) {
-            add_scaled(square, &side.own, weight * by);
+            add_scaled(square, &own, weight * by);
         }
         for (sums, by) in self.common.iter_mut().zip(side.common) {
-            add_scaled(sums, &side.own, weight * by);
+            add_scaled(sums, &own, weight * by);
         }
-        add_scaled(&mut self.right, &side.own, weight * distance_m);
+        add_scaled(&mut self.right, &own, weight * distance_m);
     }
 }
 
