@@ -2,7 +2,7 @@
 
 use super::beams::{BeamReader, read_beams};
 use super::calibration::calibration;
-use super::sensor_models::RecordedSensors;
+use super::manifest::RecordedSensors;
 use super::true_clock::TrueClock;
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError, Stage};
@@ -112,7 +112,7 @@ impl<'a> BoundAccumulator<'a> {
         run: Option<&Run>,
     ) -> Result<Self, RunError> {
         let recorded = run.map(RecordedSensors::of).unwrap_or_default();
-        let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), recorded, None)?;
+        let (found, _) = calibration(reader, selection, &CalibrationSpec::default(), &recorded, None)?;
         Ok(Self {
             world,
             planes: (map == MapKnowledge::Unknown).then(|| world.planes()),

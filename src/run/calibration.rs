@@ -1,34 +1,15 @@
 //! Extrinsics and sensor models of a recording.
 
+use super::manifest::RecordedSensors;
 use super::recorded_manifest::RecordedManifest;
-use super::sensor_models::{GivenModels, ImuNoiseSpec, LidarNoiseSpec, RecordedSensors, SensorModels, unknown_imu};
+use super::sensor_models::{CalibrationSpec, SensorModels, unknown_imu};
 use super::{Manifest, RunError};
-use serde::{Deserialize, Serialize};
 use zsim_base::geometry::Pose;
 use zsim_base::measurement::{Calibration, ImuAveraging, ImuNoise};
 use zsim_base::spec::SpecError;
 use zsim_dynamics::PlacementSpec;
 use zsim_recording::{FoundCalibration, Reader, Selection};
 use zsim_sensors::Imu;
-
-/// Sensor calibration given by the user.
-///
-/// A missing entry is read from the recording; if the recording has none, it is that of the UTM-30LX or of a typical
-/// IMU (`specs/imus/unknown.ron`).
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CalibrationSpec {
-    /// Pose of the lidar in the head.
-    pub head_from_laser: Option<PlacementSpec>,
-    /// Pose of the IMU in the head.
-    pub head_from_imu: Option<PlacementSpec>,
-    /// The IMU's noise.
-    pub imu: Option<ImuNoiseSpec>,
-    /// How the IMU derives its samples from the motion.
-    pub imu_averaging: Option<ImuAveraging>,
-    /// The lidar's noise.
-    pub lidar: Option<LidarNoiseSpec>,
-}
 
 /// The calibration of a recording's sensors: from `given`, else from the recording, else that of unknown sensors.
 ///
@@ -39,8 +20,7 @@ pub fn recording_calibration(
     selection: &Selection,
     given: &CalibrationSpec,
 ) -> Result<FoundCalibration, RunError> {
-    let recorded = RecordedManifest::read(reader);
-    Ok(calibration(reader, selection, given, recorded.sensors(), None)?.0)
+    Ok(calibration(reader, selection, given, &RecordedManifest::read(reader).sensors, None)?.0)
 }
 
 /// The calibration for an estimate: from the user, else from the recording, else the defaults.
@@ -50,14 +30,12 @@ pub(super) fn calibration(
     reader: &Reader,
     selection: &Selection,
     given: &CalibrationSpec,
-    recorded: RecordedSensors,
+    recorded: &RecordedSensors,
     body_frame: Option<&str>,
 ) -> Result<(FoundCalibration, SensorModels), RunError> {
     let pose_of = |placement: Option<PlacementSpec>| placement.map(|placement| placement.pose());
     let (head_from_laser, head_from_imu) = (pose_of(given.head_from_laser), pose_of(given.head_from_imu));
-    let known =
-        GivenModels { imu: given.imu.as_ref(), imu_averaging: given.imu_averaging, lidar: given.lidar.as_ref() };
-    let models = SensorModels::new(known, recorded)?;
+    let models = SensorModels::new(given, recorded)?;
     let defaults = Calibration {
         head_from_laser: head_from_laser.unwrap_or_else(Pose::identity),
         head_from_imu: head_from_imu.unwrap_or_else(Pose::identity),

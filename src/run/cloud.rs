@@ -1,6 +1,7 @@
 //! Metrics of the registered cloud against the true surfaces.
 
 use super::beams::ProjectedBeam;
+use super::manifest::{Manifest, RecordedSensors};
 use super::register::{ClassCounts, RegisteredCloud, SampledBeam};
 use super::truth_cursor::TrueState;
 use rayon::prelude::*;
@@ -9,6 +10,7 @@ use zsim_estimation::ReturnClass;
 use zsim_evaluation::{CloudErrors, CloudSummary};
 use zsim_report::{CloudMetrics, FilterMetrics};
 use zsim_sensors::Cylinder;
+use zsim_simulation::SimulationSummary;
 use zsim_world::World;
 
 /// Maximum distance from a point to the nearest surface, m.
@@ -24,6 +26,18 @@ pub(super) struct Surroundings<'a> {
     pub world: &'a World,
     /// Parts of the carrier that the lidar can see, fixed to the base.
     pub carrier: &'a [Cylinder],
+}
+
+/// Origin of a recording; only the evaluation uses it, not the estimator.
+pub(super) struct Origin<'a> {
+    /// Manifest of the recording, with the settings of the estimator.
+    pub manifest: &'a Manifest,
+    /// The sensors of the simulation, as far as they are known.
+    pub sensors: RecordedSensors,
+    /// Scene and carrier, if they are known.
+    pub surroundings: Option<Surroundings<'a>>,
+    /// Summary of the simulation, if it ran in this process.
+    pub simulation: Option<&'a SimulationSummary>,
 }
 
 /// The kind of object that a beam hit.

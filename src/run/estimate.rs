@@ -3,19 +3,18 @@
 use super::beams::{Reading, read_beams};
 use super::bound::{BoundAccumulator, RecordingBound};
 use super::calibration::calibration;
-use super::cloud::{Surroundings, cloud_metrics};
+use super::cloud::{Origin, Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
 use super::comparison::Comparison;
 use super::integrity::write_windows;
 use super::loops::{LoopInputs, Loops};
+use super::manifest::RecordedSensors;
 use super::map::write_map;
 use super::map_options::MapOptions;
-use super::origin::Origin;
 use super::page::RunResults;
 use super::recorded_manifest::RecordedManifest;
 use super::register::{CloudRegistration, RegisteredCloud, Registration};
 use super::result_files::{estimate_files, remove};
-use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, ProgressMonitor, RunError, Stage, artefacts, comparison, memory};
 use std::path::Path;
 use zsim_estimation::{EstimatorSpec, Timing};
@@ -92,7 +91,7 @@ pub fn estimate_recording(
     let carrier = recorded.manifest.run.as_ref().map(|run| carrier_of(&run.head.spec)).unwrap_or_default();
     let surroundings = world.as_ref().map(|world| Surroundings { world, carrier: &carrier });
     let manifest = &recorded.manifest.clone().with_estimator(&options.estimator);
-    let origin = Origin { manifest, sensors: recorded.sensors(), surroundings, simulation: None };
+    let origin = Origin { manifest, sensors: recorded.sensors, surroundings, simulation: None };
     estimate_in(reader, selection, folder, options, &origin, watch)
 }
 
@@ -106,7 +105,8 @@ pub(super) fn estimate_in(
     watch: &mut ProgressMonitor,
 ) -> Result<EstimateResult, RunError> {
     origin.manifest.write(&folder.join("manifest.ron"))?;
-    let recorded = if options.ignore_manifest { RecordedSensors::default() } else { origin.sensors };
+    let unknown = RecordedSensors::default();
+    let recorded = if options.ignore_manifest { &unknown } else { &origin.sensors };
     let (found, models) =
         calibration(reader, selection, &options.calibration, recorded, options.body_frame.as_deref())?;
     report_notes(selection, &found, options, watch);

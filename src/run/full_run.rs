@@ -1,10 +1,8 @@
 //! The full run: simulation, recording, estimation, evaluation and report.
 
-use super::cloud::Surroundings;
+use super::cloud::{Origin, Surroundings};
 use super::estimate::estimate_in;
-use super::origin::Origin;
 use super::result_files::{full_run_files, remove};
-use super::sensor_models::RecordedSensors;
 use super::viewer_files::ViewerFiles;
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, RunError, record};
 use std::path::Path;
@@ -37,11 +35,6 @@ pub fn simulate_and_estimate(
     let reader = Reader::open(&recording)?;
     let selection = reader.select(&TopicPreference::default())?;
     let surroundings = Some(Surroundings { world: simulation.world(), carrier: simulation.carrier() });
-    let origin = Origin {
-        manifest: &manifest,
-        sensors: RecordedSensors::of(simulation.inputs()),
-        surroundings,
-        simulation: Some(&summary),
-    };
+    let origin = Origin { manifest: &manifest, sensors: manifest.sensors(), surroundings, simulation: Some(&summary) };
     estimate_in(&reader, &selection, folder, options, &origin, watch)
 }

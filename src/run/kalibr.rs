@@ -1,8 +1,7 @@
 //! Reads calibrations in the YAML formats of Kalibr and allan_variance_ros: IMU noise and lidar-IMU extrinsics.
 
 use super::RunError;
-use super::calibration::CalibrationSpec;
-use super::sensor_models::ImuNoiseSpec;
+use super::sensor_models::{CalibrationSpec, ImuNoiseSpec};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -53,6 +52,18 @@ struct Imu {
     #[serde(rename = "T_i_b")]
     imu_from_body: Option<IgnoredAny>,
 }
+
+/// A key of a file, and its value.
+type ImuKey = (&'static str, fn(&Imu) -> Option<f64>);
+
+/// The keys of the noise of an IMU, and that of its rate.
+const NOISE_KEYS: [ImuKey; 5] = [
+    ("gyroscope_noise_density", |imu| imu.gyroscope_noise_density),
+    ("accelerometer_noise_density", |imu| imu.accelerometer_noise_density),
+    ("gyroscope_random_walk", |imu| imu.gyroscope_random_walk),
+    ("accelerometer_random_walk", |imu| imu.accelerometer_random_walk),
+    ("update_rate", |imu| imu.update_rate),
+];
 
 /// A sensor of Kalibr's chain, camera or lidar; only the transform is used.
 #[derive(Debug, Default, Deserialize)]
@@ -148,34 +159,21 @@ impl File {
     /// The IMU noise, if the file has it; it has neither turn-on biases nor limits.
     fn noise(&self, name: &str) -> Result<Option<ImuNoiseSpec>, RunError> {
         let invalid = |problem: String| RunError::Calibration { name: name.to_owned(), problem };
-        let nested = self.imu0.as_ref();
-        let given = [
-            (
-                "gyroscope_noise_density",
-                self.gyroscope_noise_density,
-                nested.and_then(|imu| imu.gyroscope_noise_density),
-            ),
-            (
-                "accelerometer_noise_density",
-                self.accelerometer_noise_density,
-                nested.and_then(|imu| imu.accelerometer_noise_density),
-            ),
-            ("gyroscope_random_walk", self.gyroscope_random_walk, nested.and_then(|imu| imu.gyroscope_random_walk)),
-            (
-                "accelerometer_random_walk",
-                self.accelerometer_random_walk,
-                nested.and_then(|imu| imu.accelerometer_random_walk),
-            ),
-        ];
-        let rate = ("update_rate", self.update_rate, nested.and_then(|imu| imu.update_rate));
+        let top_level = Imu {
+            gyroscope_noise_density: self.gyroscope_noise_density,
+            accelerometer_noise_density: self.accelerometer_noise_density,
+            gyroscope_random_walk: self.gyroscope_random_walk,
+            accelerometer_random_walk: self.accelerometer_random_walk,
+            update_rate: self.update_rate,
+            ..Imu::default()
+        };
         let mut values = [None; 5];
-        for ((key, flat, nested), value) in given.into_iter().chain([rate]).zip(&mut values) {
-            *value = match (flat, nested) {
-                (Some(_), Some(_)) => {
-                    return Err(invalid(format!("{key} is given twice, at the top level and under imu0")));
-                }
-                (flat, nested) => flat.or(nested),
-            };
+        for ((key, of), value) in NOISE_KEYS.iter().zip(&mut values) {
+            let (flat, nested) = (of(&top_level), self.imu0.as_ref().and_then(of));
+            if flat.is_some() && nested.is_some() {
+                return Err(invalid(format!("{key} is given twice, at the top level and under imu0")));
+            }
+            *value = flat.or(nested);
             if value.is_some_and(|value| !(value.is_finite() && value > 0.0)) {
                 return Err(invalid(format!("{key} must be a positive number")));
             }
@@ -190,8 +188,8 @@ impl File {
                 ..ImuNoiseSpec::default()
             })),
             _ => {
-                let missing = given.iter().zip(values).filter(|(_, value)| value.is_none()).map(|((key, ..), _)| *key);
-                let missing: Vec<_> = missing.collect();
+                let noise = NOISE_KEYS[..4].iter().zip(values);
+                let missing: Vec<_> = noise.filter(|(_, value)| value.is_none()).map(|((key, _), _)| *key).collect();
                 Err(invalid(format!("the IMU noise has no {}", missing.join(" and no "))))
             }
         }

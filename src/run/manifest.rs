@@ -7,6 +7,7 @@ use zsim_base::files::replace_text;
 use zsim_base::spec::{self, Source, SpecError};
 use zsim_estimation::EstimatorSpec;
 use zsim_recording::Reader;
+use zsim_sensors::{ImuSpec, LidarSpec};
 use zsim_simulation::{Run, Simulation};
 use zsim_world::{World, WorldError};
 
@@ -59,6 +60,11 @@ impl Manifest {
         Some(World::build(scene, &Source::in_memory("the recording's scene", "")))
     }
 
+    /// The sensors of the simulation; none are known without simulation.
+    pub(super) fn sensors(&self) -> RecordedSensors {
+        self.run.as_ref().map(RecordedSensors::of).unwrap_or_default()
+    }
+
     /// Adds the settings of the estimator.
     #[must_use]
     pub fn with_estimator(mut self, estimator: &EstimatorSpec) -> Self {
@@ -76,5 +82,19 @@ impl Manifest {
 
     pub(super) fn write(&self, path: &Path) -> Result<(), RunError> {
         Ok(replace_text(path, &self.to_ron()?)?)
+    }
+}
+
+/// Sensors of the simulation in a recording's manifest; `None` for those that are not known.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RecordedSensors {
+    pub imu: Option<ImuSpec>,
+    pub lidar: Option<LidarSpec>,
+}
+
+impl RecordedSensors {
+    /// The sensors of `run`.
+    pub fn of(run: &Run) -> Self {
+        Self { imu: Some(run.imu.spec.clone()), lidar: Some(run.lidar.spec.clone()) }
     }
 }

@@ -1,34 +1,28 @@
 //! The manifest in a recording, as far as this version of zsim can read it.
 
 use super::Manifest;
-use super::sensor_models::RecordedSensors;
+use super::manifest::RecordedSensors;
 use zsim_base::spec::{Named, NamedSpec, SpecError, Subtree, Tree};
 use zsim_recording::Reader;
-use zsim_sensors::{ImuSpec, LidarSpec};
 
 /// The manifest in a recording; of one that another version wrote with other keys, the sensors that can be read.
 pub(super) struct RecordedManifest {
     /// The manifest; without simulation if it is missing or cannot be read completely.
     pub manifest: Manifest,
-    /// Sensors of a manifest that cannot be read completely.
-    partial: PartialSensors,
+    /// The sensors of its simulation, also of a manifest that cannot be read completely.
+    pub sensors: RecordedSensors,
     /// A message to the user on a manifest that cannot be read completely.
     pub note: Option<String>,
-}
-
-/// The sensors that could be read.
-#[derive(Default)]
-struct PartialSensors {
-    imu: Option<ImuSpec>,
-    lidar: Option<LidarSpec>,
 }
 
 impl RecordedManifest {
     /// Reads the manifest in the recording of `reader`.
     pub(super) fn read(reader: &Reader) -> Self {
-        let complete = |manifest| Self { manifest, partial: PartialSensors::default(), note: None };
         match Manifest::in_recording(reader) {
-            Ok(manifest) => complete(manifest.unwrap_or_else(Manifest::without_simulation)),
+            Ok(manifest) => {
+                let manifest = manifest.unwrap_or_else(Manifest::without_simulation);
+                Self { sensors: manifest.sensors(), manifest, note: None }
+            }
             Err(error) => Self::read_partially(reader.manifest().unwrap_or_default(), &error),
         }
     }
@@ -56,15 +50,7 @@ impl RecordedManifest {
             env!("CARGO_PKG_VERSION"),
             error.message()
         );
-        Self { manifest: Manifest::without_simulation(), partial: PartialSensors { imu, lidar }, note: Some(note) }
-    }
-
-    /// The sensors that could be read.
-    pub(super) fn sensors(&self) -> RecordedSensors<'_> {
-        match &self.manifest.run {
-            Some(run) => RecordedSensors::of(run),
-            None => RecordedSensors { imu: self.partial.imu.as_ref(), lidar: self.partial.lidar.as_ref() },
-        }
+        Self { manifest: Manifest::without_simulation(), sensors: RecordedSensors { imu, lidar }, note: Some(note) }
     }
 }
 

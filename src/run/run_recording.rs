@@ -2,7 +2,6 @@
 
 use super::calibration::calibration;
 use super::loops::{LoopInputs, Loops};
-use super::sensor_models::RecordedSensors;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError, RunInputs};
 use std::fs::File;
 use zsim_base::measurement::Calibration;
@@ -21,9 +20,8 @@ impl RunRecording {
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
         let manifest = Manifest::in_recording(&reader)?.filter(|_| !ignore_manifest);
-        let recorded = manifest.as_ref().and_then(|manifest| manifest.run.as_ref()).map(RecordedSensors::of);
-        let recorded = recorded.unwrap_or_default();
-        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), recorded, None)?;
+        let recorded = manifest.as_ref().map(Manifest::sensors).unwrap_or_default();
+        let (found, _) = calibration(&reader, &selection, &CalibrationSpec::default(), &recorded, None)?;
         Ok(Self { reader, selection, calibration: found.calibration })
     }
 

@@ -1,13 +1,14 @@
 //! Sensor models for an estimate: noise and averaging, each value with its source.
 
+use super::manifest::RecordedSensors;
 use super::{Manifest, RunError};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use zsim_base::measurement::{ImuAveraging, ImuNoise, LidarNoise};
 use zsim_base::spec::{Kind, NamedSpec, SpecError, find};
+use zsim_dynamics::PlacementSpec;
 use zsim_report::{NoiseMetrics, SensorMetrics, noise_sources};
 use zsim_sensors::{Imu, ImuSpec, Lidar, LidarSpec};
-use zsim_simulation::Run;
 
 /// Noise of a simulated sensor that has none, because the estimator weights residuals by it: densities of gyroscope,
 /// rad/s/sqrt(Hz), and accelerometer, m/s^2/sqrt(Hz), below those of tactical IMUs, and standard deviation of ranges, m.
@@ -83,6 +84,25 @@ pub struct LidarNoiseSpec {
     pub far_m: Option<f64>,
 }
 
+/// Sensor calibration given by the user.
+///
+/// A missing entry is read from the recording; if the recording has none, it is that of the UTM-30LX or of a typical
+/// IMU (`specs/imus/unknown.ron`).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CalibrationSpec {
+    /// Pose of the lidar in the head.
+    pub head_from_laser: Option<PlacementSpec>,
+    /// Pose of the IMU in the head.
+    pub head_from_imu: Option<PlacementSpec>,
+    /// The IMU's noise.
+    pub imu: Option<ImuNoiseSpec>,
+    /// How the IMU derives its samples from the motion.
+    pub imu_averaging: Option<ImuAveraging>,
+    /// The lidar's noise.
+    pub lidar: Option<LidarNoiseSpec>,
+}
+
 /// Models of IMU and lidar, and the source of each value.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SensorModels {
@@ -94,46 +114,24 @@ pub(super) struct SensorModels {
     noise: Vec<(String, f64, ValueSource)>,
 }
 
-/// Sensors of the simulation in a recording's manifest; `None` for those that are not known.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct RecordedSensors<'a> {
-    pub imu: Option<&'a ImuSpec>,
-    pub lidar: Option<&'a LidarSpec>,
-}
-
-impl<'a> RecordedSensors<'a> {
-    /// The sensors of `run`.
-    pub fn of(run: &'a Run) -> Self {
-        Self { imu: Some(&run.imu.spec), lidar: Some(&run.lidar.spec) }
-    }
-}
-
-/// Values that a calibration file contains.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct GivenModels<'a> {
-    pub imu: Option<&'a ImuNoiseSpec>,
-    pub imu_averaging: Option<ImuAveraging>,
-    pub lidar: Option<&'a LidarNoiseSpec>,
-}
-
 impl SensorModels {
     /// Given values, completed by those of the `recorded` sensors, else by those of unknown sensors.
-    pub fn new(given: GivenModels, recorded: RecordedSensors) -> Result<Self, RunError> {
+    pub fn new(given: &CalibrationSpec, recorded: &RecordedSensors) -> Result<Self, RunError> {
         let manifest = Manifest::source("");
-        let (imu, imu_source) = match recorded.imu {
+        let (imu, imu_source) = match &recorded.imu {
             Some(spec) => (Imu::new(spec, &manifest)?, ValueSource::Manifest),
             None => (unknown_imu()?, ValueSource::Assumed),
         };
-        let (lidar, lidar_source) = match recorded.lidar {
+        let (lidar, lidar_source) = match &recorded.lidar {
             Some(spec) => (Lidar::new(spec, &manifest)?, ValueSource::Manifest),
             None => (unknown_lidar()?, ValueSource::Assumed),
         };
         let mut values = Values { source: imu_source, noise: Vec::new() };
-        let imu_noise = values.imu(given.imu.copied().unwrap_or_default(), &imu.noise());
+        let imu_noise = values.imu(given.imu.unwrap_or_default(), &imu.noise());
         values.source = lidar_source;
         Ok(Self {
             imu: imu_noise,
-            lidar: values.lidar(given.lidar.copied().unwrap_or_default(), &lidar.noise()),
+            lidar: values.lidar(given.lidar.unwrap_or_default(), &lidar.noise()),
             imu_averaging: given.imu_averaging.unwrap_or(imu.averaging()),
             averaging_source: given.imu_averaging.map_or(imu_source, |_| ValueSource::Calibration),
             noise: values.noise,

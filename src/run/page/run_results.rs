@@ -1,9 +1,9 @@
 //! Results of a run that the page shows.
 
+use super::super::cloud::Origin;
 use super::super::integrity::Integrity;
 use super::super::loops::BestEstimate;
 use super::super::open_loop::OpenLoopRun;
-use super::super::origin::Origin;
 use super::super::sampled_truth::SampledTruth;
 use zsim_evaluation::Errors;
 use zsim_evaluation::InformationBound;
