@@ -2,16 +2,14 @@
 
 use super::RunError;
 use super::beams::ProjectedBeam;
-use super::decimation::decimated;
+use super::comparison::decimated;
 use super::page::RunResults;
 use super::register::SampledBeam;
 use super::result_files::METRICS;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
-use zsim_base::files::FileError;
-use zsim_base::files::replace_text;
-use zsim_base::files::subfolder;
+use zsim_base::files::{FileError, replace_text, subfolder};
 use zsim_base::geometry::{Pose, Trajectory, Vector};
 use zsim_estimation::ReturnClass;
 use zsim_report::Metrics;
@@ -24,14 +22,11 @@ const CELL_M: f64 = 0.05;
 const SLICE_HALF_HEIGHT_M: f64 = 0.4;
 
 /// A plot with its file name.
-pub(super) struct Plot {
-    name: &'static str,
-    figure: Figure,
-}
+type Plot = (&'static str, Figure);
 
 /// The plots of an estimate; returns closer than `min_range_m` are from the carrier.
 pub(super) fn plots(results: &RunResults, sample: &[SampledBeam], min_range_m: f64) -> Vec<Plot> {
-    let RunResults { open: run, best, open_errors, bound, .. } = *results;
+    let RunResults { loops, best, bound, .. } = *results;
     let comparison = best.comparison;
     let world_from_map = comparison.and_then(|found| found.world_from_map).unwrap_or_else(Pose::identity);
     let estimate = decimated(best.map_from_head.iter().map(|(stamp, pose)| (stamp, world_from_map * pose)));
@@ -42,17 +37,16 @@ pub(super) fn plots(results: &RunResults, sample: &[SampledBeam], min_range_m: f
         beam.class == ReturnClass::Static && (point - origin).norm() >= min_range_m
     };
     let outline = outline(sample.iter().filter(is_wall), &world_from_map, &estimate);
-    let plot = |name, figure: Figure| Plot { name, figure };
-
-    let mut plots = vec![plot("trajectory", zsim_report::trajectory_views(truth, &estimate, &outline))];
-    if let Some(errors) = comparison.and_then(|found| found.errors.as_ref()).map(|errors| &errors.decimated) {
-        plots.push(plot("errors", zsim_report::errors_over_time(errors)));
-        plots.extend(open_errors.map(|open| plot("loops", zsim_report::open_and_closed_loop_errors(open, errors))));
+    let mut plots = vec![("trajectory", zsim_report::trajectory_views(truth, &estimate, &outline))];
+    if let Some(errors) = comparison.and_then(|found| found.errors.as_ref()) {
+        plots.push(("errors", zsim_report::errors_over_time(errors)));
+        let open = loops.open_errors();
+        plots.extend(open.map(|open| ("loops", zsim_report::open_and_closed_loop_errors(open, errors))));
     }
-    plots.extend(bound.map(|bound| plot("bound", zsim_report::bound_over_time(bound))));
-    plots.push(plot("pitch", zsim_report::head_pitch(truth, &estimate)));
-    let true_offsets = results.truth.map_or(&[][..], |truth| &truth.clock_offsets);
-    plots.push(plot("clock", zsim_report::clock_offset(true_offsets, &run.clock_offsets)));
+    plots.extend(bound.map(|bound| ("bound", zsim_report::bound_over_time(bound))));
+    plots.push(("pitch", zsim_report::head_pitch(truth, &estimate)));
+    let true_offsets = results.true_offsets().unwrap_or_default();
+    plots.push(("clock", zsim_report::clock_offset(true_offsets, &loops.open.estimate.clock_offsets)));
     plots
 }
 
@@ -75,7 +69,7 @@ fn outline<'a>(
 /// Writes the plots and the page, then `metrics.json`.
 pub(super) fn write(folder: &Path, plots: &[Plot], page: &RunPage) -> Result<(), RunError> {
     let pictures = subfolder(folder, "plots").map_err(FileError::at(folder))?;
-    plots.par_iter().try_for_each(|plot| plot.figure.save(&pictures, plot.name).map(drop))?;
+    plots.par_iter().try_for_each(|(name, figure)| figure.save(&pictures, name).map(drop))?;
     replace_text(&folder.join("report.html"), &page.html())?;
     write_metrics(folder, page.metrics)
 }

@@ -2,7 +2,6 @@
 
 use super::ProgressMonitor;
 use super::closed_loop::ClosedLoopRun;
-use super::decimation::{decimated, decimated_errors};
 use super::open_loop::OpenLoopRun;
 use super::sampled_truth::SampledTruth;
 use zsim_base::geometry::{Pose, PoseCovariance, Trajectory};
@@ -10,11 +9,13 @@ use zsim_base::measurement::LidarCorrection;
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::EstimatorSpec;
 use zsim_evaluation::{
-    Consistency, Drift, Errors, EvaluationError, Pairs, RelativeError, clock_error, clock_error_after, consistency,
-    drift, relative_error,
+    Errors, EvaluationError, Pairs, clock_error, clock_error_after, consistency, drift, relative_error,
 };
 use zsim_report::{ClockMetrics, ClosedLoopMetrics, LidarMetrics, LoopMetrics, OpenLoopMetrics, SimulationMetrics};
 use zsim_simulation::SimulationSummary;
+
+/// Maximum number of points of a curve in a plot: about a dozen for each pixel of its width.
+const MAX_PLOT_POINTS: usize = 50_000;
 
 /// Comparison of an estimate with the truth.
 pub(super) struct Comparison {
@@ -22,27 +23,10 @@ pub(super) struct Comparison {
     pub truth: Trajectory,
     /// Rigid alignment of the estimate by all positions; `None` if they do not determine it.
     pub world_from_map: Option<Pose>,
-    /// Errors after this alignment.
-    pub errors: Option<AlignedErrors>,
-    drift: Option<Drift>,
-    consistency: Option<Consistency>,
-    per_minute: Option<RelativeError>,
-}
-
-/// Errors after alignment.
-pub(super) struct AlignedErrors {
-    pub position_rmse_m: f64,
-    rotation_rmse_rad: f64,
-    /// Errors over time, decimated for plots.
-    pub decimated: Errors,
-}
-
-impl AlignedErrors {
-    fn after(pairs: &Pairs, world_from_map: &Pose) -> Self {
-        let errors = Errors::after(pairs, world_from_map);
-        let (position_rmse_m, rotation_rmse_rad) = (errors.position_rmse_m(), errors.rotation_rmse_rad());
-        Self { position_rmse_m, rotation_rmse_rad, decimated: decimated_errors(&errors) }
-    }
+    /// Errors over time after this alignment, decimated for plots.
+    pub errors: Option<Errors>,
+    /// Errors and consistency, as metrics of an open loop without its other metrics.
+    figures: OpenLoopMetrics,
 }
 
 impl Comparison {
@@ -57,16 +41,38 @@ impl Comparison {
     ) -> Self {
         let pairs = Pairs::of(map_from_head, &truth.heads);
         let world_from_map = or_note(pairs.world_from_map(), watch);
-        let errors = world_from_map.map(|world_from_map| AlignedErrors::after(&pairs, &world_from_map));
+        let errors = world_from_map.map(|world_from_map| Errors::after(&pairs, &world_from_map));
+        let (drift, consistency) = (drift(&pairs).ok(), consistency(&pairs, covariances));
+        let per_minute = relative_error(&pairs, Span::from_seconds(60.0)).ok();
+        let figures = OpenLoopMetrics {
+            position_rmse_m: errors.as_ref().map(Errors::position_rmse_m),
+            rotation_rmse_deg: errors.as_ref().map(|errors| errors.rotation_rmse_rad().to_degrees()),
+            drift_m_per_min: drift.map(|drift| drift.position_m_per_min),
+            yaw_drift_deg_per_min: drift.and_then(|drift| drift.yaw_rad_per_min).map(f64::to_degrees),
+            end_error_m: drift.map(|drift| drift.end_error_m),
+            relative_error_per_minute_m: per_minute.map(|error| error.position_rmse_m),
+            position_nees: consistency.map(|found| found.position_nees),
+            attitude_nees: consistency.map(|found| found.attitude_nees),
+            ..OpenLoopMetrics::default()
+        };
         Self {
             truth: decimated(pairs.stamps().iter().copied().zip(pairs.truth().iter().copied())),
             world_from_map,
-            errors,
-            drift: drift(&pairs).ok(),
-            consistency: consistency(&pairs, covariances),
-            per_minute: relative_error(&pairs, Span::from_seconds(60.0)).ok(),
+            errors: errors.map(|errors| errors.decimated(stride(errors.stamps.len()))),
+            figures,
         }
     }
+}
+
+/// Decimates poses to the maximum number of plot points.
+pub(super) fn decimated(stamped: impl ExactSizeIterator<Item = (Stamp, Pose)>) -> Trajectory {
+    let stride = stride(stamped.len());
+    Trajectory::from_poses(stamped.step_by(stride)).unwrap_or_default()
+}
+
+/// The decimation factor for `count` points.
+fn stride(count: usize) -> usize {
+    count.div_ceil(MAX_PLOT_POINTS).max(1)
 }
 
 /// Returns the value, or reports the error as a note.
@@ -88,23 +94,10 @@ pub(super) fn simulation_metrics(summary: &SimulationSummary) -> SimulationMetri
 
 /// Metrics of the open loop.
 pub(super) fn open_loop_metrics(run: &OpenLoopRun, comparison: Option<&Comparison>) -> OpenLoopMetrics {
-    let drift = comparison.and_then(|found| found.drift);
-    let errors = comparison.and_then(|found| found.errors.as_ref());
-    let consistency = comparison.and_then(|found| found.consistency);
-    let relative = comparison.and_then(|found| found.per_minute);
     OpenLoopMetrics {
         wall_s: Some(run.wall_s),
         fraction_of_acquisition: Some(run.wall_s / run.acquisition_s).filter(|fraction| fraction.is_finite()),
-        fixed_views: None,
-        position_rmse_m: errors.map(|errors| errors.position_rmse_m),
-        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
-        drift_m_per_min: drift.map(|drift| drift.position_m_per_min),
-        yaw_drift_deg_per_min: drift.and_then(|drift| drift.yaw_rad_per_min).map(f64::to_degrees),
-        end_error_m: drift.map(|drift| drift.end_error_m),
-        relative_error_per_minute_m: relative.map(|error| error.position_rmse_m),
-        imu_only_drift_m_per_min: None,
-        position_nees: consistency.map(|found| found.position_nees),
-        attitude_nees: consistency.map(|found| found.attitude_nees),
+        ..comparison.map(|found| found.figures.clone()).unwrap_or_default()
     }
 }
 
@@ -114,22 +107,22 @@ pub(super) fn closed_loop_metrics(
     comparison: Option<&Comparison>,
     acquisition_s: f64,
 ) -> ClosedLoopMetrics {
-    let errors = comparison.and_then(|found| found.errors.as_ref());
-    let consistency = comparison.and_then(|found| found.consistency);
+    let found = comparison.map(|found| found.figures.clone()).unwrap_or_default();
+    let report = run.estimate.report;
     ClosedLoopMetrics {
         wall_s: Some(run.wall_s),
         fraction_of_acquisition: Some(run.wall_s / acquisition_s).filter(|fraction| fraction.is_finite()),
-        position_rmse_m: errors.map(|errors| errors.position_rmse_m),
-        rotation_rmse_deg: errors.map(|errors| errors.rotation_rmse_rad.to_degrees()),
+        position_rmse_m: found.position_rmse_m,
+        rotation_rmse_deg: found.rotation_rmse_deg,
         bound_rmse_m: None,
-        position_nees: consistency.map(|found| found.position_nees),
-        attitude_nees: consistency.map(|found| found.attitude_nees),
+        position_nees: found.position_nees,
+        attitude_nees: found.attitude_nees,
         loops: LoopMetrics {
-            proposed: Some(run.loops.proposed as u64),
-            verified: Some(run.loops.verified as u64),
-            closed: Some(run.loops.closed as u64),
+            proposed: Some(report.loops.proposed as u64),
+            verified: Some(report.loops.verified as u64),
+            closed: Some(report.loops.closed as u64),
         },
-        left: run.rejected_because.map(str::to_owned),
+        left: report.rejected_because.map(str::to_owned),
     }
 }
 
@@ -149,11 +142,11 @@ pub(super) fn imu_only_drift_m_per_min(
 
 /// Metrics of the clock offset.
 pub(super) fn clock_metrics(run: &OpenLoopRun, truth: Option<&SampledTruth>) -> ClockMetrics {
-    let error = truth.and_then(|truth| clock_error(&run.clock_offsets, &truth.clock_offsets));
-    let error_after =
-        |after_s| truth.and_then(|truth| clock_error_after(&run.clock_offsets, &truth.clock_offsets, after_s));
+    let (offsets, truth) = (&run.estimate.clock_offsets, truth.map(|truth| &truth.clock_offsets));
+    let error = truth.and_then(|truth| clock_error(offsets, truth));
+    let error_after = |after_s| truth.and_then(|truth| clock_error_after(offsets, truth, after_s));
     ClockMetrics {
-        offset_end_s: run.clock_offsets.last().map(|(_, offset_s)| *offset_s),
+        offset_end_s: offsets.last().map(|(_, offset_s)| *offset_s),
         offset_rmse_s: error.map(|error| error.offset_rmse_s),
         offset_end_error_s: error.map(|error| error.offset_end_error_s),
         error_after_30s_s: error_after(30.0),

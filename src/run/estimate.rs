@@ -7,10 +7,11 @@ use super::cloud::{Origin, Surroundings, cloud_metrics};
 use super::cloud_files::CloudOptions;
 use super::comparison::Comparison;
 use super::integrity::write_windows;
-use super::loops::{LoopInputs, Loops};
+use super::loops::Loops;
 use super::manifest::RecordedSensors;
 use super::map::write_map;
 use super::map_options::MapOptions;
+use super::open_loop::LoopInputs;
 use super::page::RunResults;
 use super::recorded_manifest::RecordedManifest;
 use super::register::{CloudRegistration, RegisteredCloud, Registration};
@@ -126,14 +127,14 @@ pub(super) fn estimate_in(
     let (integrity, pairs) = (loops.integrity(), loops.pairs());
     let mut metrics = Metrics {
         sensors: models.metrics(),
-        lidar: comparison::lidar_metrics(best.lidar.range_m, &run.calibrated_lidar, &options.estimator),
+        lidar: comparison::lidar_metrics(best.lidar.range_m, &run.estimate.calibrated_lidar, &options.estimator),
         ..described(origin, registered.as_ref(), best.comparison, loops.metrics(&integrity, pairs.as_ref()))
     };
     metrics.open_loop.fixed_views = Some(options.estimator.fixed_views as u64);
     metrics.open_loop.imu_only_drift_m_per_min = imu_only_drift_m_per_min;
     metrics.closed_loop.bound_rmse_m = bound.map(|bound| bound.aligned_position_rmse_m);
     integrity.write(folder)?;
-    write_windows(folder, &run.windows)?;
+    write_windows(folder, &run.estimate.windows)?;
     watch.check_stop()?;
     let Some(registered) = registered else {
         artefacts::write_metrics(folder, &metrics)?;
@@ -141,10 +142,8 @@ pub(super) fn estimate_in(
     };
     let results = RunResults {
         origin,
-        open: run,
-        truth,
+        loops: &loops,
         best: &best,
-        open_errors: loops.open_errors(),
         bound,
         integrity: &integrity,
         pairs: pairs.as_ref(),
@@ -240,7 +239,7 @@ impl<'a> Estimated<'a> {
             expected_s: origin.simulation.map(|summary| summary.duration_s),
         };
         let loops = inputs.run(bound, watch)?;
-        if writes_map && !loops.open.observed.is_empty() {
+        if writes_map && !loops.open.estimate.observed.is_empty() {
             write_map(&loops.open, &loops.best(), &options.estimator, map, folder)?;
         }
         Ok(loops)

@@ -46,14 +46,14 @@ pub(super) fn estimate(
             let compared = CloudComparison::new(&recording, &loops, run.simulation, run.reference, &watch)?;
             compared.add_to(&mut results);
         }
-        let curve = |truth: &SampledTruth| ClockCurve::new(&loops.open.clock_offsets, &truth.clock_offsets);
+        let curve = |truth: &SampledTruth| ClockCurve::new(&loops.open.estimate.clock_offsets, &truth.clock_offsets);
         Ok((results, loops.truth.as_ref().map(curve)))
     })
 }
 
 /// The results without those of the cloud.
 fn results(loops: &Loops, run: &EstimatedRun) -> Results {
-    let rigid_link = |truth| rigid_link_rmse_m(run.simulation.head(), &loops.open.map_from_head, truth);
+    let rigid_link = |truth| rigid_link_rmse_m(run.simulation.head(), &loops.open.estimate.trajectory, truth);
     Results {
         metrics: loops.metrics(&loops.integrity(), loops.pairs().as_ref()),
         rigid_link_rmse_m: loops.truth.as_ref().and_then(rigid_link),

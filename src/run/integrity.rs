@@ -45,10 +45,11 @@ pub(super) struct PoseBound {
 ///
 /// The bound is that of the open loop: the closed loop is closer, but its matches cannot detect an error that they contain.
 fn bounds(run: &OpenLoopRun, trajectory: &Trajectory, covariances: &[(Stamp, PoseCovariance)]) -> Vec<PoseBound> {
-    let doubts = bound_factors(&run.windows);
+    let windows = &run.estimate.windows;
+    let doubts = bound_factors(windows);
     let aligned_until = aligned_until(trajectory).unwrap_or(run.recorded.0);
     let ratio = aligned_error_ratio(trajectory);
-    let dead_reckoned_until = dead_reckoned_until(&run.windows, aligned_until);
+    let dead_reckoned_until = dead_reckoned_until(windows, aligned_until);
     let radii_m = radii(run);
     let ambiguities = ambiguities(run);
     let mut covariances = covariances.iter().zip(&radii_m).peekable();
@@ -86,7 +87,7 @@ fn ambiguities(run: &OpenLoopRun) -> Vec<(Stamp, f64)> {
         *sum_m = sum_m.hypot(ambiguity_m);
         Some((stamp, *sum_m))
     };
-    run.warnings.iter().filter_map(ambiguity).scan(0.0, sum).collect()
+    run.estimate.warnings.iter().filter_map(ambiguity).scan(0.0, sum).collect()
 }
 
 /// Ratio of the error after alignment to the predicted error, for the length of a trajectory.
@@ -124,14 +125,14 @@ fn radii(run: &OpenLoopRun) -> Vec<f64> {
     let mut radii_m = run.radii_m.clone();
     let Some(((first, _), (last, _))) = run.covariances.first().zip(run.covariances.last()) else { return radii_m };
     let is_short = last.seconds_since(*first) < 2.0 * ALIGNMENT_S;
-    let marked_m: Vec<f64> =
-        run.aligned_covariances.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
+    let marked = &run.estimate.aligned_covariances;
+    let marked_m: Vec<f64> = marked.iter().map(|(_, covariance)| radius_99(&covariance_blocks(covariance).0)).collect();
     let is_aligned = |(stamp, _): &(Stamp, PoseCovariance)| is_short || stamp.seconds_since(*first) < ALIGNMENT_S;
     let aligned = run.covariances.partition_point(is_aligned);
     let end_m = aligned.checked_sub(1).filter(|_| !is_short).map_or(0.0, |last| radii_m[last]);
     let largest_m = radii_m[..aligned].iter().copied().fold(0.0, f64::max);
     for (radius_m, (stamp, _)) in radii_m[..aligned].iter_mut().zip(&run.covariances) {
-        let after = run.aligned_covariances.partition_point(|(at, _)| at <= stamp);
+        let after = marked.partition_point(|(at, _)| at <= stamp);
         let before_m = after.checked_sub(1).map(|before| marked_m[before]);
         let adjacent_m = marked_m.get(after).copied().unwrap_or(end_m).max(before_m.unwrap_or(0.0));
         *radius_m = if marked_m.is_empty() { largest_m } else { adjacent_m };
@@ -149,11 +150,11 @@ pub(super) struct Integrity {
 impl Integrity {
     /// Computes the integrity of the result `trajectory`: that of the closed loop if there is one, else of the open loop.
     pub fn of(run: &OpenLoopRun, closed: Option<&ClosedLoopRun>, trajectory: &Trajectory) -> Self {
-        let covariances = closed.map_or(&run.covariances, |closed| &closed.covariances);
+        let covariances = closed.map_or(&run.covariances, |closed| &closed.estimate.covariances);
         let mut bounds = bounds(run, trajectory, covariances);
         let evidence = Evidence {
-            windows: &run.windows,
-            warnings: &run.warnings,
+            windows: &run.estimate.windows,
+            warnings: &run.estimate.warnings,
             samples: run.samples,
             recorded: run.recorded,
             estimated: trajectory.span().unwrap_or(run.recorded),
@@ -202,19 +203,14 @@ impl Integrity {
         let finite = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
         let mut all: Vec<f64> = self.bounds.iter().map(|bound| bound.bound_m_99).collect();
         let largest = all.iter().copied().filter(|bound| bound.is_finite()).fold(0.0, f64::max);
-        let check = pairs.and_then(|pairs| self.check_bounds(pairs));
         IntegrityMetrics {
             bound_m_99: quantile(&mut all, 0.5).and_then(finite),
             largest_bound_m: Some(largest).filter(|bound| *bound > 0.0),
             since_s: causes.iter().map(|cause| cause.from_s).min_by(f64::total_cmp),
             causes,
-            within_bound: check.map(|check| check.fraction_within),
-            bound_over_error: check.and_then(|check| finite(check.bound_over_error)),
-            aligned_rmse_m: check.map(|check| check.rmse_m),
-            largest_error_m: check.map(|check| check.largest_m),
             path_length_m: Some(self.path_length_m),
-            aligned_p95_m: check.map(|check| check.p95_m),
             degraded_fraction: self.degraded_fraction(trajectory),
+            ..pairs.and_then(|pairs| self.check_bounds(pairs)).unwrap_or_default()
         }
     }
 
@@ -235,7 +231,7 @@ impl Integrity {
     }
 
     /// Compares the bounds with the true errors.
-    fn check_bounds(&self, pairs: &Pairs) -> Option<BoundCheck> {
+    fn check_bounds(&self, pairs: &Pairs) -> Option<IntegrityMetrics> {
         let errors = Self::aligned_errors(pairs)?;
         let mut bounds = self.bounds.iter();
         let mut current = bounds.next()?;
@@ -252,12 +248,13 @@ impl Integrity {
             errors_m.push(error_m);
             ratios.push(current.bound_m_99 / error_m.max(1e-9));
         }
-        Some(BoundCheck {
-            fraction_within: within as f64 / ratios.len() as f64,
-            bound_over_error: quantile(&mut ratios, 0.5)?,
-            rmse_m: errors.position_rmse_m(),
-            p95_m: quantile(&mut errors_m, 0.95)?,
-            largest_m: *errors_m.last()?,
+        Some(IntegrityMetrics {
+            within_bound: Some(within as f64 / ratios.len() as f64),
+            bound_over_error: Some(quantile(&mut ratios, 0.5)?).filter(|ratio| ratio.is_finite()),
+            aligned_rmse_m: Some(errors.position_rmse_m()),
+            aligned_p95_m: Some(quantile(&mut errors_m, 0.95)?),
+            largest_error_m: Some(*errors_m.last()?),
+            ..IntegrityMetrics::default()
         })
     }
 
@@ -272,21 +269,6 @@ impl Integrity {
     }
 }
 
-/// Comparison of the bounds with the true errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct BoundCheck {
-    /// Fraction of the poses whose error is within the bound.
-    fraction_within: f64,
-    /// Median ratio of bound to error.
-    bound_over_error: f64,
-    /// RMS position error, m.
-    rmse_m: f64,
-    /// 95 % quantile of the position error, m.
-    p95_m: f64,
-    /// Largest position error, m.
-    largest_m: f64,
-}
-
 /// Sorts `values`; returns the first that is above the fraction `at` of them, `None` without values.
 fn quantile(values: &mut [f64], at: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
@@ -299,13 +281,9 @@ fn path_length_m(trajectory: &Trajectory) -> f64 {
     let mut path_m = 0.0;
     for (stamp, pose) in trajectory.iter() {
         let position = pose.translation.vector;
-        match last {
-            Some((before, _)) if stamp.seconds_since(before) < 1.0 => {}
-            Some((_, from)) => {
-                path_m += (position - from).norm();
-                last = Some((stamp, position));
-            }
-            None => last = Some((stamp, position)),
+        if last.is_none_or(|(before, _)| stamp.seconds_since(before) >= 1.0) {
+            path_m += last.map_or(0.0, |(_, from)| (position - from).norm());
+            last = Some((stamp, position));
         }
     }
     path_m
@@ -333,11 +311,11 @@ fn above_limit(bounds: &[PoseBound], limit_m: f64, severity: Severity) -> Option
 
 /// The interval in which the loop closure moved the trajectory by more than the error bound.
 fn moved_by_loop_closure(run: &OpenLoopRun, closed: &ClosedLoopRun, bounds: &[PoseBound]) -> Option<Event> {
-    let open = closed.open_loop_recalibrated.as_ref().unwrap_or(&run.map_from_head);
+    let open = closed.estimate.open_loop_recalibrated.as_ref().unwrap_or(&run.estimate.trajectory);
     let shift = |((stamp, a), (_, b)): ((Stamp, &Pose), (Stamp, &Pose))| {
         (stamp, (a.translation.vector - b.translation.vector).norm())
     };
-    let shifts = open.iter().zip(closed.map_from_head.iter()).map(shift).zip(bounds);
+    let shifts = open.iter().zip(closed.estimate.trajectory.iter()).map(shift).zip(bounds);
     let moved: Vec<(Stamp, f64)> = shifts
         .filter(|((_, moved_m), bound)| *moved_m > LARGE_BOUND_M.max(2.0 * bound.bound_m_99))
         .map(|(shift, _)| shift)

@@ -14,7 +14,6 @@ mod closed_loop;
 mod cloud;
 mod cloud_files;
 mod comparison;
-mod decimation;
 mod disk;
 mod error;
 mod estimate;

@@ -4,38 +4,16 @@ use super::bound::BoundAccumulator;
 use super::closed_loop::{ClosedLoopRun, run_closed_loop};
 use super::comparison::{self, Comparison};
 use super::integrity::Integrity;
-use super::map_options::MapOptions;
-use super::open_loop::{OpenLoopOptions, OpenLoopRun, run_open_loop};
+use super::open_loop::{LoopInputs, OpenLoopRun, run_open_loop};
 use super::sampled_truth::SampledTruth;
 use super::{ProgressMonitor, RunError, Stage};
-use std::path::Path;
 use zsim_base::geometry::{PoseCovariance, Trajectory};
-use zsim_base::measurement::{Calibration, LidarCorrection};
+use zsim_base::measurement::LidarCorrection;
 use zsim_base::time::Stamp;
-use zsim_estimation::EstimatorSpec;
+use zsim_estimation::OpenLoop;
 use zsim_evaluation::{Errors, Pairs};
-use zsim_recording::{Reader, Selection, write_tum};
+use zsim_recording::write_tum;
 use zsim_report::Metrics;
-
-/// What is estimated, and how.
-#[derive(Clone, Copy)]
-pub(super) struct LoopInputs<'a> {
-    pub reader: &'a Reader,
-    pub selection: &'a Selection,
-    pub calibration: &'a Calibration,
-    pub estimator: &'a EstimatorSpec,
-    /// The map in which to localise the head; `None` to start a new map.
-    pub map: Option<&'a MapOptions>,
-    pub closes_loops: bool,
-    /// Whether to keep the observed surfaces also without closing loops, for a map.
-    pub keeps_surfels: bool,
-    /// Whether the true poses in the recording are those of the estimated frame.
-    pub has_truth: bool,
-    /// Folder for `open_loop.tum` and `closed_loop.tum`; `None` to write no files.
-    pub folder: Option<&'a Path>,
-    /// Length of the recording, s, if it is known, for the progress.
-    pub expected_s: Option<f64>,
-}
 
 /// Open loop and closed loop, each with its comparison with the truth.
 pub(super) struct Loops {
@@ -67,20 +45,17 @@ impl LoopInputs<'_> {
     /// # Errors
     /// When the recording cannot be read, the estimation fails, a file cannot be written, or the run is stopped.
     pub fn run(&self, bound: Option<&mut BoundAccumulator>, watch: &mut ProgressMonitor) -> Result<Loops, RunError> {
-        let Self { reader, selection, calibration, estimator, map, .. } = *self;
-        let options =
-            OpenLoopOptions { estimator, calibration, recording_surfels: self.closes_loops || self.keeps_surfels, map };
-        let tum = self.folder.map(|folder| folder.join("open_loop.tum"));
-        let open = run_open_loop(reader, selection, options, tum.as_deref(), self.expected_s, watch)?;
+        let open = run_open_loop(self, watch)?;
         open.notes.iter().for_each(|note| watch.note(&note.line()));
         let closed = self.closes_loops.then(|| self.close(&open, watch)).transpose()?;
         watch.progress(Stage::Evaluating, 0.0, None);
-        let truth = if self.has_truth { SampledTruth::read(reader, &open, bound)? } else { None };
+        let truth = if self.has_truth { SampledTruth::read(self.reader, &open, bound)? } else { None };
         let mut compare = |map_from_head, covariances: &[_]| {
             truth.as_ref().map(|truth| Comparison::new(map_from_head, covariances, truth, watch))
         };
-        let comparison = compare(&open.map_from_head, &open.covariances);
-        let closed_comparison = closed.as_ref().and_then(|closed| compare(&closed.map_from_head, &closed.covariances));
+        let comparison = compare(&open.estimate.trajectory, &open.covariances);
+        let closed_loop = closed.as_ref().map(|closed| &closed.estimate);
+        let closed_comparison = closed_loop.and_then(|closed| compare(&closed.trajectory, &closed.covariances));
         Ok(Loops { open, truth, closed, comparison, closed_comparison })
     }
 
@@ -90,7 +65,7 @@ impl LoopInputs<'_> {
         let closed = run_closed_loop(open, self.calibration, self.estimator)?;
         closed.notes.iter().for_each(|note| watch.note(note));
         if let Some(folder) = self.folder {
-            write_tum(&folder.join("closed_loop.tum"), &closed.map_from_head)?;
+            write_tum(&folder.join("closed_loop.tum"), &closed.estimate.trajectory)?;
         }
         watch.check_stop()?;
         Ok(closed)
@@ -100,29 +75,22 @@ impl LoopInputs<'_> {
 impl Loops {
     /// The estimate of the closed loop, or of the open loop if the loops were not closed.
     pub fn best(&self) -> BestEstimate<'_> {
-        let open = &self.open.map_from_head;
-        match &self.closed {
-            Some(ClosedLoopRun { map_from_head, covariances, lidar, open_loop_recalibrated, .. }) => BestEstimate {
-                map_from_head,
-                covariances,
-                observed_trajectory: open_loop_recalibrated.as_ref().unwrap_or(open),
-                lidar,
-                comparison: self.closed_comparison.as_ref(),
-            },
-            None => BestEstimate {
-                map_from_head: open,
-                covariances: &self.open.covariances,
-                observed_trajectory: open,
-                lidar: &self.open.lidar,
-                comparison: self.comparison.as_ref(),
-            },
-        }
+        let OpenLoopRun { estimate: OpenLoop { trajectory: open, lidar, .. }, covariances, .. } = &self.open;
+        let (map_from_head, observed_trajectory, comparison) = (open, open, self.comparison.as_ref());
+        let of_open_loop = BestEstimate { map_from_head, covariances, observed_trajectory, lidar, comparison };
+        self.closed.as_ref().map_or(of_open_loop, |ClosedLoopRun { estimate, .. }| BestEstimate {
+            map_from_head: &estimate.trajectory,
+            covariances: &estimate.covariances,
+            observed_trajectory: estimate.open_loop_recalibrated.as_ref().unwrap_or(open),
+            lidar: &estimate.lidar,
+            comparison: self.closed_comparison.as_ref(),
+        })
     }
 
     /// Errors of the open loop if a closed loop was computed.
     pub fn open_errors(&self) -> Option<&Errors> {
         self.closed.as_ref()?;
-        Some(&self.comparison.as_ref()?.errors.as_ref()?.decimated)
+        self.comparison.as_ref()?.errors.as_ref()
     }
 
     /// Bounds and findings of the best estimate.

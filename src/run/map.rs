@@ -49,7 +49,7 @@ pub(super) fn write_map(
     folder: &Path,
 ) -> Result<(), RunError> {
     let (open_loop, corrected) = (best.observed_trajectory, best.map_from_head);
-    let from_run = map_of(&run.observed, open_loop, corrected, &run.covariances, estimator)?;
+    let from_run = map_of(&run.estimate.observed, open_loop, corrected, &run.covariances, estimator)?;
     let map = match within {
         Some(within) => merge_maps(&within.map, &from_run, &Pose::identity())?,
         None => from_run,

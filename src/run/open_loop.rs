@@ -1,20 +1,21 @@
 //! Open-loop estimation from a recording, as it would run online.
 
 use super::cadence::Cadence;
+use super::map_options::MapOptions;
 use super::read_ahead::{MeasurementStream, read_ahead};
-use super::{MapOptions, ProgressMonitor, RunError, Stage, StageData};
+use super::{ProgressMonitor, RunError, Stage, StageData};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 use std::time::Instant;
 use zsim_base::geometry::{PoseCovariance, Trajectory};
-use zsim_base::measurement::{Calibration, LidarCorrection, Measurement};
+use zsim_base::measurement::{Calibration, Measurement};
 use zsim_base::parallel::Stopped;
 use zsim_base::time::{Span, Stamp};
 use zsim_estimation::{
-    EstimatedPose, Estimator, EstimatorSpec, Event, Evidence, LocalisedPose, ObservedSurfels, OpenLoop, Severity,
-    Timing, WindowReport, covariance_blocks, radius_99,
+    EstimatedPose, Estimator, EstimatorSpec, Evidence, LocalisedPose, OpenLoop, Severity, Timing, covariance_blocks,
+    radius_99,
 };
 use zsim_evaluation::{DeadReckoning, EvaluationError, RestDetection};
 use zsim_recording::{ClockStep, Loss, Reader, RecordingError, Selection, TumWriter};
@@ -28,30 +29,19 @@ const COVARIANCE_PERIOD: Span = Span::from_nanos(100_000_000);
 
 /// Result of the open-loop estimation.
 pub(super) struct OpenLoopRun {
-    /// The estimate.
-    pub map_from_head: Trajectory,
+    /// The estimate, without its poses; its clock offsets relate to the recorded stamps, s. Its observed surfels are empty
+    /// unless they were wanted.
+    pub estimate: OpenLoop,
     /// Covariances of the poses in the map frame, at 10 Hz.
     pub covariances: Vec<(Stamp, PoseCovariance)>,
     /// 99 % radii of the position error relative to the alignment of the first seconds, at the same stamps, m.
     pub radii_m: Vec<f64>,
-    /// Covariances of marked poses of the first seconds relative to the alignment over these.
-    pub aligned_covariances: Vec<(Stamp, PoseCovariance)>,
-    /// The estimated clock offset over lidar time, s.
-    pub clock_offsets: Vec<(Stamp, f64)>,
-    /// Estimated correction of the lidar calibration that the poses are consistent with (gyroscope axes).
-    pub lidar: LidarCorrection,
-    /// The same correction along the IMU axes, as in a calibration file.
-    pub calibrated_lidar: LidarCorrection,
     /// Missing or unused measurements, and intervals without an estimate.
     pub losses: Vec<EventMetrics>,
     /// Other information for the user.
     pub notes: Vec<EventMetrics>,
     /// Number of IMU samples in the recording.
     pub samples: usize,
-    /// Reports of the windows, in order of time.
-    pub windows: Vec<WindowReport>,
-    /// Warnings of the estimator, in order of time.
-    pub warnings: Vec<Event>,
     /// First and last stamp of the recording's measurements.
     pub recorded: (Stamp, Stamp),
     /// Number of lidar returns in the recording.
@@ -60,61 +50,63 @@ pub(super) struct OpenLoopRun {
     pub acquisition_s: f64,
     /// Trajectory by IMU dead reckoning, for comparison.
     pub dead_reckoning: Result<Trajectory, EvaluationError>,
-    /// Observations for the closed loop and the map; empty without `recording_surfels`.
-    pub observed: ObservedSurfels,
     /// Wall-clock time, including reading but not building the observed surfels, s.
     pub wall_s: f64,
     /// Run time of each part of the estimator.
     pub timing: Timing,
 }
 
-/// Options of the open loop.
+/// What is estimated, and how.
 #[derive(Clone, Copy)]
-pub(super) struct OpenLoopOptions<'a> {
-    pub estimator: &'a EstimatorSpec,
+pub(super) struct LoopInputs<'a> {
+    pub reader: &'a Reader,
+    pub selection: &'a Selection,
     pub calibration: &'a Calibration,
-    /// Whether to keep the observations for the closed loop and the map.
-    pub recording_surfels: bool,
+    pub estimator: &'a EstimatorSpec,
     /// The map in which to localise the head; `None` to start a new map.
     pub map: Option<&'a MapOptions>,
+    pub closes_loops: bool,
+    /// Whether to keep the observed surfaces also without closing loops, for a map.
+    pub keeps_surfels: bool,
+    /// Whether the true poses in the recording are those of the estimated frame.
+    pub has_truth: bool,
+    /// Folder for `open_loop.tum` and `closed_loop.tum`; `None` to write no files.
+    pub folder: Option<&'a Path>,
+    /// Length of the recording, s, if it is known, for the progress.
+    pub expected_s: Option<f64>,
 }
 
-/// Runs the estimator over the recording of `reader`.
+/// Runs the estimator over a recording.
 ///
-/// Poses are written to the TUM file `tum`, if given, as they become final. `expected_s` is the length of the recording,
-/// if it is known, for the progress.
-pub(super) fn run_open_loop(
-    reader: &Reader,
-    selection: &Selection,
-    options: OpenLoopOptions,
-    tum: Option<&Path>,
-    expected_s: Option<f64>,
-    watch: &mut ProgressMonitor,
-) -> Result<OpenLoopRun, RunError> {
+/// Poses are written to `open_loop.tum`, if files are wanted, as they become final.
+pub(super) fn run_open_loop(options: &LoopInputs, watch: &mut ProgressMonitor) -> Result<OpenLoopRun, RunError> {
     let started = Instant::now();
-    let estimator = Estimator::new(options.estimator, options.calibration)?;
-    let estimator = if options.recording_surfels { estimator.recording_surfels() } else { estimator };
-    let mut estimator = match options.map {
-        Some(prior) => estimator.in_map(&prior.map, prior.map_from_head.as_ref()),
-        None => estimator,
-    };
+    let selection = options.selection;
+    let mut estimator = Estimator::new(options.estimator, options.calibration)?;
+    if options.closes_loops || options.keeps_surfels {
+        estimator = estimator.recording_surfels();
+    }
+    if let Some(prior) = options.map {
+        estimator = estimator.in_map(&prior.map, prior.map_from_head.as_ref());
+    }
     watch.data(StageData::Start { stage: Stage::Estimating, calibration: options.calibration });
-    let tum = tum.map(TumWriter::create).transpose()?;
+    let tum = options.folder.map(|folder| TumWriter::create(&folder.join("open_loop.tum"))).transpose()?;
     let mut poses = PoseOutput { tum, map_from_head: Trajectory::new(), covariances: Vec::new(), radii_m: Vec::new() };
     let mut inputs = InputSummary::new(options.calibration);
-    let (pushed, loss) = read_ahead(reader, selection, |measurements| {
-        push_all(measurements, &mut estimator, &mut inputs, &mut poses, expected_s, watch)
+    let (pushed, loss) = read_ahead(options.reader, selection, |measurements| {
+        push_all(measurements, &mut estimator, &mut inputs, &mut poses, options.expected_s, watch)
     });
     if let Err(RunError::Stopped(_)) = pushed {
         poses.close()?;
         return Err(Stopped.into());
     }
     pushed?;
-    let result = estimator.finish()?;
+    let mut result = estimator.finish()?;
     poses.take(&result.poses)?;
     poses.close()?;
     watch.data(StageData::Poses(&result.poses));
     let PoseOutput { map_from_head, covariances, radii_m, .. } = poses;
+    (result.trajectory, result.poses) = (map_from_head, Vec::new());
 
     // The reported offsets relate to the recorded stamps, without the shift that the selection applies and with the steps of
     // the clocks, which the reader removes.
@@ -125,28 +117,22 @@ pub(super) fn run_open_loop(
             .map(|step| if step.topic == selection.imu_topic { step.by } else { Span::ZERO - step.by }.seconds())
             .sum::<f64>()
     };
+    result.clock_offsets.iter_mut().for_each(|(at, offset_s)| *offset_s = *offset_s - shift_s + stepped_s(*at));
     let start = inputs.start();
     let (losses, notes) = losses_and_notes(&result, &loss, &inputs);
     Ok(OpenLoopRun {
-        map_from_head,
         covariances,
         radii_m,
-        aligned_covariances: result.aligned_covariances,
         timing: result.windows.iter().map(|window| window.timing).sum(),
-        clock_offsets: result.clock_offsets.into_iter().map(|(at, s)| (at, s - shift_s + stepped_s(at))).collect(),
-        lidar: result.lidar,
-        calibrated_lidar: result.calibrated_lidar,
         losses,
         notes,
         samples: inputs.imu.count(),
         recorded: (start, start + Span::from_seconds(inputs.seconds())),
-        windows: result.windows,
-        warnings: result.warnings,
         returns: inputs.returns,
         acquisition_s: inputs.seconds(),
         dead_reckoning: inputs.dead_reckoning.finish(),
         wall_s: started.elapsed().as_secs_f64() - result.observed.elapsed_s(),
-        observed: result.observed,
+        estimate: result,
     })
 }
 
@@ -170,14 +156,11 @@ fn push_all(
             let newest = estimator.take_poses();
             poses.take(&newest)?;
             watch.data(StageData::Poses(&newest));
-            poses
-                .evidence(estimator, inputs)
-                .into_iter()
-                .for_each(|evidence| watch.data(StageData::Evidence(evidence)));
-            watch.progress(Stage::Estimating, inputs.seconds(), expected_s);
-            if watch.is_stopped() {
-                return Err(Stopped.into());
+            if let Some(evidence) = poses.evidence(estimator, inputs) {
+                watch.data(StageData::Evidence(evidence));
             }
+            watch.progress(Stage::Estimating, inputs.seconds(), expected_s);
+            watch.check_stop()?;
         }
     }
     Ok(())

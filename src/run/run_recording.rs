@@ -1,7 +1,8 @@
 //! A recording of a study, read by one thread, and the estimates from it.
 
 use super::calibration::calibration;
-use super::loops::{LoopInputs, Loops};
+use super::loops::Loops;
+use super::open_loop::LoopInputs;
 use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError, RunInputs};
 use std::fs::File;
 use zsim_base::measurement::Calibration;

@@ -29,7 +29,7 @@ impl SampledTruth {
         run: &OpenLoopRun,
         mut bound: Option<&mut BoundAccumulator>,
     ) -> Result<Option<Self>, RecordingError> {
-        let stamps = run.map_from_head.stamps();
+        let stamps = run.estimate.trajectory.stamps();
         let (mut heads, mut bases) = (PoseSampler::at(stamps), PoseSampler::at(stamps));
         let mut dead_reckoned = PoseSampler::at(run.dead_reckoning.as_ref().map_or(&[], Trajectory::stamps));
         let mut clock_offsets = Vec::new();

@@ -117,18 +117,18 @@ fn components(results: &RunResults) -> Vec<Chart> {
 
 /// Position error of open loop and closed loop after rigid alignment, and the information bound.
 fn loops(results: &RunResults) -> Option<Chart> {
-    let best = &results.best.comparison?.errors.as_ref()?.decimated;
+    let (best, open) = (results.best.comparison?.errors.as_ref()?, results.loops.open_errors());
     let largest = |errors: &Errors| errors.position_m.iter().map(Vector::norm).fold(0.0, f64::max);
     let LengthUnit { symbol: unit, per_m } =
-        LengthUnit::for_lengths_up_to(results.open_errors.map_or(0.0, largest).max(largest(best)));
+        LengthUnit::for_lengths_up_to(open.map_or(0.0, largest).max(largest(best)));
     let kept = decimated(best.stamps.len());
     let t_s = kept.clone().map(|k| results.seconds(best.stamps[k])).collect();
     let error =
         |errors: &Errors, stamp| value_at(errors, stamp).map_or(f64::NAN, |k| errors.position_m[k].norm() * per_m);
     let over_time = |errors: &Errors| kept.clone().map(|k| error(errors, best.stamps[k])).collect::<Vec<_>>();
-    let name = if results.open_errors.is_some() { "closed loop" } else { "open loop" };
+    let name = if open.is_some() { "closed loop" } else { "open loop" };
     let mut curves = vec![curve(name, CurveStyle::Estimate, over_time(best))];
-    curves.extend(results.open_errors.map(|open| curve("open loop", CurveStyle::Second, over_time(open))));
+    curves.extend(open.map(|open| curve("open loop", CurveStyle::Second, over_time(open))));
     if let Some(bound) = results.bound {
         let at = |stamp: Stamp| {
             let after = bound.stamps.partition_point(|at| *at < stamp);
@@ -142,12 +142,12 @@ fn loops(results: &RunResults) -> Option<Chart> {
 
 /// The estimated and the true clock offset.
 fn clock(results: &RunResults) -> Chart {
-    let estimate = &results.open.clock_offsets;
+    let estimate = &results.loops.open.estimate.clock_offsets;
     let kept = decimated(estimate.len());
     let t_s = kept.clone().map(|k| results.seconds(estimate[k].0)).collect();
     let estimated = kept.clone().map(|k| estimate[k].1 * 1e3).collect();
     let mut curves = vec![curve("estimate", CurveStyle::Estimate, estimated)];
-    if let Some(truth) = results.truth.map(|truth| &truth.clock_offsets).filter(|offsets| !offsets.is_empty()) {
+    if let Some(truth) = results.true_offsets().filter(|offsets| !offsets.is_empty()) {
         let at = |stamp: Stamp| truth[truth.partition_point(|(at, _)| *at < stamp).min(truth.len() - 1)].1 * 1e3;
         curves.push(curve("truth", CurveStyle::Truth, kept.map(|k| at(estimate[k].0)).collect()));
     }
@@ -156,7 +156,7 @@ fn clock(results: &RunResults) -> Chart {
 
 /// Matches, conditioning, residual and run time of the windows.
 fn windows(results: &RunResults) -> Vec<ChartGroup> {
-    let windows = &results.open.windows;
+    let windows = &results.loops.open.estimate.windows;
     let kept = decimated(windows.len());
     let t_s: Vec<f64> = kept.clone().map(|k| results.seconds(windows[k].stamp)).collect();
     let values = |of: &dyn Fn(&WindowReport) -> f64| kept.clone().map(|k| of(&windows[k])).collect::<Vec<_>>();

@@ -20,16 +20,16 @@ impl RunResults<'_> {
         RunPage {
             metrics,
             manifest,
-            parts: self.open.timing.parts().to_vec(),
+            parts: self.loops.open.timing.parts().to_vec(),
             view: self.view(),
             charts: charts::all(self),
-            timeline: timeline::rows(self.open, self.integrity.causes()),
+            timeline: timeline::rows(&self.loops.open, self.integrity.causes()),
         }
     }
 
     fn view(&self) -> View {
         let of_truth = |poses: fn(&SampledTruth) -> &[(Stamp, Pose)]| {
-            self.truth.map(|truth| paths::truth(self, poses(truth))).unwrap_or_default()
+            self.loops.truth.as_ref().map(|truth| paths::truth(self, poses(truth))).unwrap_or_default()
         };
         let world = self.world();
         let (surfaces, surfaces_are_partial) = world.map(static_surfaces).unwrap_or_default();
@@ -48,6 +48,11 @@ impl RunResults<'_> {
         }
     }
 
+    /// The true clock offsets, if they are known.
+    pub(super) fn true_offsets(&self) -> Option<&[(Stamp, f64)]> {
+        self.loops.truth.as_ref().map(|truth| &truth.clock_offsets[..])
+    }
+
     /// The scene, if it is known and the estimate is aligned with it.
     fn world(&self) -> Option<&World> {
         self.alignment().and(self.origin.surroundings.map(|surroundings| surroundings.world))
@@ -64,6 +69,6 @@ impl RunResults<'_> {
 
     /// Time since the first measurement, s.
     fn seconds(&self, stamp: Stamp) -> f64 {
-        stamp.seconds_since(self.open.recorded.0)
+        stamp.seconds_since(self.loops.open.recorded.0)
     }
 }

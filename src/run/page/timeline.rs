@@ -13,9 +13,10 @@ const MERGED_WITHIN_S: f64 = 0.5;
 ///
 /// They are the causes of the status, the warnings of the estimator, and the problems of the windows.
 pub(super) fn rows(run: &OpenLoopRun, causes: &[Event]) -> Vec<TimelineRow> {
-    let problems = run.windows.iter().filter_map(|window| Some(Event::at(window.stamp, window.problem.clone()?)));
+    let problems =
+        run.estimate.windows.iter().filter_map(|window| Some(Event::at(window.stamp, window.problem.clone()?)));
     let mut rows: BTreeMap<_, Vec<Interval>> = BTreeMap::new();
-    for event in causes.iter().chain(&run.warnings).cloned().chain(problems) {
+    for event in causes.iter().chain(&run.estimate.warnings).cloned().chain(problems) {
         let [from_s, to_s] = [event.from, event.to].map(|stamp| stamp.seconds_since(run.recorded.0));
         let row = rows.entry((Reverse(event.severity), in_words(event.kind.key()))).or_default();
         row.push(Interval { from_s, to_s, sentence: event.kind.to_string() });
