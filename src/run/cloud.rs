@@ -2,7 +2,7 @@
 
 use super::beams::ProjectedBeam;
 use super::manifest::{Manifest, RecordedSensors};
-use super::register::{ClassCounts, RegisteredCloud, SampledBeam};
+use super::register::{RegisteredCloud, SampledBeam};
 use super::truth_cursor::TrueState;
 use rayon::prelude::*;
 use zsim_base::geometry::{Pose, Surface, Vector};
@@ -84,11 +84,9 @@ pub(super) fn cloud_metrics(
     world_from_map: Option<&Pose>,
     surroundings: Option<Surroundings>,
 ) -> CloudMetrics {
-    let filter = match registered.filtered {
-        true => filter_metrics(&registered.class_counts),
-        false => FilterMetrics::default(),
-    };
-    let counted = CloudMetrics { points: Some(registered.class_counts.all()), filter, ..CloudMetrics::default() };
+    let filter = filter_metrics(registered);
+    let points = Some(registered.class_counts.iter().sum());
+    let counted = CloudMetrics { points, filter, ..CloudMetrics::default() };
     let (Some(world_from_map), Some(surroundings)) = (world_from_map, surroundings) else {
         return counted;
     };
@@ -144,23 +142,19 @@ fn evaluated_filter<'a>(
         kept_all_sigma_m: errors(&mut registered.sample.iter().filter(kept)).map(|cloud| cloud.sigma_m),
         standing_dropped_fraction: dropped(Target::Static),
         movers_dropped_fraction: dropped(Target::Mover),
-        ..filter_metrics(&registered.class_counts)
+        ..filter_metrics(registered)
     }
 }
 
-/// Counts of the filter: returns in the cloud, and removed returns by reason.
-fn filter_metrics(classes: &ClassCounts) -> FilterMetrics {
-    FilterMetrics {
-        kept: Some(classes.kept),
-        dropped_mixed: Some(classes.mixed),
-        dropped_isolated: Some(classes.isolated),
-        dropped_moving: Some(classes.moving),
-        ..FilterMetrics::default()
-    }
+/// Counts of the filter, if it was on: returns in the cloud, and removed returns by reason.
+fn filter_metrics(registered: &RegisteredCloud) -> FilterMetrics {
+    let counts = registered.class_counts.map(|count| registered.filtered.then_some(count));
+    let [kept, dropped_mixed, dropped_isolated, dropped_moving] = counts;
+    FilterMetrics { kept, dropped_mixed, dropped_isolated, dropped_moving, ..FilterMetrics::default() }
 }
 
 /// End and origin of a beam in the world.
-fn in_world(beam: &ProjectedBeam, world_from: &Pose) -> (Vector, Option<Vector>) {
+pub(super) fn in_world(beam: &ProjectedBeam, world_from: &Pose) -> (Vector, Option<Vector>) {
     let moved = |at: &Vector| world_from.rotation * at + world_from.translation.vector;
     (moved(&beam.point), Some(moved(&beam.origin)))
 }
@@ -228,7 +222,7 @@ mod tests {
             class: if end.x == 6.0 { ReturnClass::Static } else { ReturnClass::Dynamic },
         };
         let registered = RegisteredCloud {
-            class_counts: ClassCounts { kept: 16, moving: 4, ..ClassCounts::default() },
+            class_counts: [16, 0, 0, 4],
             page_points: Vec::new(),
             filtered: true,
             sample: ends.iter().map(judged).collect(),

@@ -14,7 +14,7 @@ use super::map_options::MapOptions;
 use super::open_loop::LoopInputs;
 use super::page::RunResults;
 use super::recorded_manifest::RecordedManifest;
-use super::register::{CloudRegistration, RegisteredCloud, Registration};
+use super::register::{CloudRegistration, RegisteredCloud};
 use super::result_files::{estimate_files, remove};
 use super::{CalibrationSpec, ProgressMonitor, RunError, Stage, artefacts, comparison, memory};
 use std::path::Path;
@@ -184,22 +184,14 @@ impl<'a> Estimated<'a> {
         folder: &Path,
         watch: &mut ProgressMonitor,
     ) -> Result<(Option<RegisteredCloud>, Option<RecordingBound>), RunError> {
-        let (best, with_truth) = (loops.best(), loops.truth.is_some());
-        let registration = self.options.cloud.map(|options| Registration {
-            calibration: &self.found.calibration,
-            body_frame: &self.found.body_frame,
-            map_from_head: best.map_from_head,
-            covariances: best.covariances,
-            lidar: best.lidar,
-            returns: loops.open.returns,
-            options,
-        });
-        let mut cloud = registration.map(|registration| registration.start(folder)).transpose()?;
+        let with_truth = loops.truth.is_some();
+        let start = |options| CloudRegistration::start(self.found, loops, options, folder);
+        let mut cloud = self.options.cloud.map(start).transpose()?;
         let mut bound = bound.filter(|_| with_truth);
         let of_cloud = cloud.iter_mut().map(|cloud| cloud as Reading);
         let of_bound = bound.iter_mut().map(|bound| bound as Reading);
         let readers: Vec<Reading> = of_cloud.chain(of_bound).collect();
-        let (first, last) = best.map_from_head.span().unwrap_or_default();
+        let (first, last) = loops.best().map_from_head.span().unwrap_or_default();
         if !readers.is_empty() {
             read_beams((self.reader, self.selection), with_truth, readers, &mut |stamp| {
                 watch.progress(Stage::Registering, stamp.seconds_since(first), Some(last.seconds_since(first)));

@@ -1,6 +1,6 @@
 //! Progress reports and cancellation of experiments.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use zsim_base::measurement::{Calibration, LidarScan};
 use zsim_base::parallel::{Stopped, check};
 use zsim_estimation::{EstimatedPose, Evidence};
@@ -72,10 +72,6 @@ pub struct ProgressMonitor<'a> {
 }
 
 impl ProgressMonitor<'_> {
-    pub(super) fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
     /// Fails if the experiment is to stop.
     ///
     /// # Errors

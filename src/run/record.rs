@@ -1,14 +1,13 @@
 //! Writes the measurements and the truth of a simulation to files.
 
-use super::observed_sink::ObservedSink;
 use super::{Manifest, ProgressMonitor, RunError, Stage, StageData};
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use zsim_base::measurement::{ImuSample, LidarScan, Sink, SinkError};
-use zsim_base::parallel::Stopped;
+use zsim_base::parallel::check;
 use zsim_base::time::Stamp;
 use zsim_recording::{BaseImuDescription, RunDescription, TumWriter, Writer};
 use zsim_simulation::{Outputs, Simulation, SimulationSummary};
@@ -29,8 +28,7 @@ pub fn record(
     watch: &mut ProgressMonitor,
 ) -> Result<SimulationSummary, RunError> {
     let recording = Writer::create(recording, description(simulation, truth_tf)?)?;
-    let truth = Some(TumWriter::create(truth)?);
-    run(simulation, Outputs::All, FileSink { recording, truth, has_truth_inside: true, stop: watch.stop }, watch)
+    run(simulation, Outputs::All, recording, Some(truth), true, watch)
 }
 
 /// Writes the measurements of the IMUs only to the MCAP file `recording`, without truth.
@@ -43,8 +41,7 @@ pub fn record_imus(
     watch: &mut ProgressMonitor,
 ) -> Result<SimulationSummary, RunError> {
     let recording = Writer::create(recording, description(simulation, false)?)?;
-    let files = FileSink { recording, truth: None, has_truth_inside: false, stop: watch.stop };
-    run(simulation, Outputs::Imus, files, watch)
+    run(simulation, Outputs::Imus, recording, None, false, watch)
 }
 
 /// As [`record`], with the truth in the TUM file only.
@@ -58,28 +55,29 @@ pub fn record_with_truth_apart(
     watch: &mut ProgressMonitor,
 ) -> Result<(), RunError> {
     let recording = Writer::create(recording, description(simulation, false)?)?;
-    let truth = Some(TumWriter::create(truth)?);
-    let files = FileSink { recording, truth, has_truth_inside: false, stop: watch.stop };
-    run(simulation, Outputs::All, files, watch).map(drop)
+    run(simulation, Outputs::All, recording, Some(truth), false, watch).map(drop)
 }
 
+/// Runs `simulation` and writes its `outputs`, and the true trajectory of the head to the TUM file `truth`.
 fn run(
     simulation: &Simulation,
     outputs: Outputs,
-    files: FileSink,
+    recording: Writer,
+    truth: Option<&Path>,
+    has_truth_inside: bool,
     watch: &mut ProgressMonitor,
 ) -> Result<SimulationSummary, RunError> {
+    let truth = truth.map(TumWriter::create).transpose()?;
     let duration_s = simulation.inputs().duration_s;
     watch.data(StageData::Start { stage: Stage::Simulating, calibration: &simulation.calibration() });
     let watch = RefCell::new(watch);
     let mut progress =
         |fraction: f64| watch.borrow_mut().progress(Stage::Simulating, fraction * duration_s, Some(duration_s));
-    let mut sink = ObservedSink { sink: files, watch: &watch };
-    let ran = simulation.run_outputs(outputs, &mut sink, &mut progress);
-    sink.sink.finish()?;
-    if watch.borrow().is_stopped() {
-        return Err(Stopped.into());
-    }
+    let stop = watch.borrow().stop;
+    let mut files = FileSink { recording, truth, has_truth_inside, stop, observer: Some(&watch) };
+    let ran = simulation.run_outputs(outputs, &mut files, &mut progress);
+    files.finish()?;
+    check(stop)?;
     let summary = ran?;
     if let Some(contact) = &summary.coil_contact {
         watch.borrow_mut().note(&contact.warning());
@@ -93,15 +91,13 @@ pub(super) fn record_together(
     recordings: Vec<Writer>,
     watch: &ProgressMonitor,
 ) -> Result<(), RunError> {
-    let files = |recording| FileSink { recording, truth: None, has_truth_inside: true, stop: watch.stop };
+    let files =
+        |recording| FileSink { recording, truth: None, has_truth_inside: true, stop: watch.stop, observer: None };
     let mut all: Vec<FileSink> = recordings.into_iter().map(files).collect();
     let ran = Simulation::run_together(simulations, &mut all.iter_mut().collect::<Vec<_>>(), &mut |_| ());
     all.into_iter().try_for_each(FileSink::finish)?;
-    if watch.is_stopped() {
-        return Err(Stopped.into());
-    }
-    ran?;
-    Ok(())
+    watch.check_stop()?;
+    Ok(ran.map(drop)?)
 }
 
 /// Description of a simulation in its recording: calibration, rates and manifest.
@@ -119,16 +115,24 @@ pub(super) fn description(simulation: &Simulation, truth_tf: bool) -> Result<Run
     })
 }
 
-/// Writes measurements and truth of a run to the recording and to the TUM file.
-struct FileSink<'a> {
+/// Writes measurements and truth of a run to the recording and to the TUM file, and reports them for a live view.
+struct FileSink<'a, 'w> {
     recording: Writer,
     truth: Option<TumWriter<BufWriter<File>>>,
     /// Whether the truth is also in the recording.
     has_truth_inside: bool,
     stop: &'a AtomicBool,
+    /// Shared with the progress callback of the simulation; neither holds it during a call of the other.
+    observer: Option<&'a RefCell<&'a mut ProgressMonitor<'w>>>,
 }
 
-impl FileSink<'_> {
+impl FileSink<'_, '_> {
+    fn observe(&self, data: StageData) {
+        if let Some(watch) = self.observer {
+            watch.borrow_mut().data(data);
+        }
+    }
+
     fn finish(self) -> Result<(), RunError> {
         self.recording.finish()?;
         self.truth.map_or(Ok(()), TumWriter::finish)?;
@@ -136,11 +140,9 @@ impl FileSink<'_> {
     }
 }
 
-impl Sink for FileSink<'_> {
+impl Sink for FileSink<'_, '_> {
     fn imu(&mut self, arrival: Stamp, sample: &ImuSample) -> Result<(), SinkError> {
-        if self.stop.load(Ordering::Relaxed) {
-            return Err(Box::new(Stopped));
-        }
+        check(self.stop)?;
         self.recording.imu(arrival, sample)
     }
 
@@ -149,12 +151,14 @@ impl Sink for FileSink<'_> {
     }
 
     fn lidar(&mut self, arrival: Stamp, scan: &LidarScan) -> Result<(), SinkError> {
+        self.observe(StageData::Scan(scan));
         self.recording.lidar(arrival, scan)
     }
 }
 
-impl TruthSink for FileSink<'_> {
+impl TruthSink for FileSink<'_, '_> {
     fn truth(&mut self, now: Stamp, sample: &TruthSample) -> Result<(), SinkError> {
+        self.observe(StageData::Truth(sample));
         if let Some(truth) = &mut self.truth {
             truth.pose(sample.lidar_stamp, &sample.head.world_from_body)?;
         }

@@ -1,17 +1,15 @@
 //! A reference system: a second simulated system in the scene of a run, whose map the map of the run is compared with.
 
-use super::beams::ProjectedBeam;
-use super::cloud::Surroundings;
+use super::cloud::{Surroundings, in_world};
 use super::loops::Loops;
 use super::record::{description, record_together};
 use super::results::{ReferenceResults, Results};
 use super::run_recording::RunRecording;
 use super::{ProgressMonitor, ReferenceInputs, RunError, RunInputs};
-use std::sync::atomic::AtomicBool;
 use zsim_base::files::FileError;
 use zsim_base::geometry::{Pose, Surface, Vector};
 use zsim_estimation::{EstimatorSpec, Status};
-use zsim_evaluation::{CloudErrors, CloudSummary, Errors, Pairs, ReferenceCloud, align_poses};
+use zsim_evaluation::{CloudErrors, Errors, Pairs, ReferenceCloud, align_poses};
 use zsim_recording::Writer;
 use zsim_simulation::{Simulation, carrier_of};
 
@@ -36,33 +34,23 @@ pub(super) struct ReferenceMap {
 }
 
 impl ReferenceMap {
-    /// Simulates, records and estimates the reference system `inputs` of a run, on one thread.
+    /// Simulates, records and estimates the reference system `inputs` of a run.
     ///
     /// # Errors
     /// If its specs do not make a simulation, if the recording cannot be written, or if the estimate fails.
-    pub(super) fn of(inputs: &ReferenceInputs, run: &RunInputs, stop: &AtomicBool) -> Result<Self, RunError> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-        pool.install(|| Self::estimate(inputs, run, stop))
-    }
-
-    fn estimate(inputs: &ReferenceInputs, run: &RunInputs, stop: &AtomicBool) -> Result<Self, RunError> {
+    pub(super) fn of(inputs: &ReferenceInputs, run: &RunInputs, watch: &mut ProgressMonitor) -> Result<Self, RunError> {
         let mut simulated = run.simulation.clone();
         (simulated.head, simulated.motion, simulated.lidar) =
             (inputs.head.clone(), inputs.motion.clone(), inputs.lidar.clone());
         (simulated.faults, simulated.base_imu) = (None, None);
         let simulation = Simulation::build(simulated)?;
-        let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
         let file = tempfile::tempfile().map_err(FileError::at(&std::env::temp_dir()))?;
         let written = file.try_clone().map_err(FileError::at(&std::env::temp_dir()))?;
         let writer = Writer::new(written, description(&simulation, false)?)?;
-        record_together(
-            std::slice::from_ref(&simulation),
-            vec![writer],
-            &ProgressMonitor { stop, report: &mut |_| {} },
-        )?;
+        record_together(std::slice::from_ref(&simulation), vec![writer], watch)?;
         let recording = RunRecording::open(file, false)?;
-        let loops = recording.estimate(run, true, &mut watch)?;
-        let aligned = AlignedCloud::new(&recording, &loops, &simulation, MAX_REFERENCE_POINTS, &watch)?;
+        let loops = recording.estimate(&run.estimator.spec, true, watch)?;
+        let aligned = AlignedCloud::new(&recording, &loops, &simulation, MAX_REFERENCE_POINTS, watch)?;
         // A lost reference has no surfaces to compare with.
         let is_known = loops.integrity().status() != Status::Lost;
         let points = aligned.estimated.into_iter().filter(|_| is_known).map(|(point, _)| point);
@@ -102,60 +90,38 @@ impl AlignedCloud {
         let carrier = carrier_of(&simulation.inputs().head.spec);
         let surroundings = Surroundings { world: simulation.world(), carrier: &carrier };
         let beams = recording.static_beams(loops, surroundings, limit, || watch.check_stop())?;
-        let moved = |beam: &ProjectedBeam, by: &Pose| {
-            let at = |of: &Vector| by.rotation * of + by.translation.vector;
-            (at(&beam.point), Some(at(&beam.origin)))
-        };
         Ok(Self {
-            estimated: beams.iter().map(|(in_map, _)| moved(in_map, &world_from_map)).collect(),
-            by_truth: beams.iter().map(|(_, by_truth)| moved(by_truth, &Pose::identity())).collect(),
+            estimated: beams.iter().map(|(in_map, _)| in_world(in_map, &world_from_map)).collect(),
+            by_truth: beams.iter().map(|(_, by_truth)| in_world(by_truth, &Pose::identity())).collect(),
             rmse_m: Errors::after(&pairs, &world_from_map).position_rmse_m(),
         })
     }
 }
 
-/// Distances of a cloud to the true surfaces, and to the map of a reference system if there is one.
-pub(super) struct CloudComparison {
-    to_reference: Option<CloudSummary>,
-    to_truth: Option<CloudSummary>,
-    by_truth: Option<CloudSummary>,
-    reference_rmse_m: Option<f64>,
-}
-
-impl CloudComparison {
-    /// Compares the cloud of an estimate.
-    ///
-    /// # Errors
-    /// If the recording cannot be read, if it cannot be aligned with the truth, or if the run is stopped.
-    pub(super) fn new(
-        recording: &RunRecording,
-        loops: &Loops,
-        simulation: &Simulation,
-        reference: Option<&ReferenceMap>,
-        watch: &ProgressMonitor,
-    ) -> Result<Self, RunError> {
-        let aligned = AlignedCloud::new(recording, loops, simulation, MAX_POINTS, watch)?;
-        let summary =
-            |surface: &dyn Surface, points: &[SeenPoint]| CloudErrors::to_surface(surface, points, REACH_M).summary();
-        Ok(Self {
-            to_reference: reference.and_then(|reference| summary(&reference.cloud, &aligned.estimated)),
-            to_truth: summary(simulation.world(), &aligned.estimated),
-            by_truth: summary(simulation.world(), &aligned.by_truth),
-            reference_rmse_m: reference.map(|reference| reference.rmse_m),
-        })
-    }
-
-    /// Adds the comparison to the results of the run.
-    pub(super) fn add_to(&self, results: &mut Results) {
-        let sigma_m = |of: Option<CloudSummary>| of.map(|summary| summary.sigma_m);
-        let bias_m = |of: Option<CloudSummary>| of.map(|summary| summary.bias_m);
-        let cloud = &mut results.metrics.cloud;
-        (cloud.sigma_m, cloud.bias_m) = (sigma_m(self.to_truth), bias_m(self.to_truth));
-        cloud.sigma_by_truth_m = sigma_m(self.by_truth);
-        results.reference = ReferenceResults {
-            sigma_m: sigma_m(self.to_reference),
-            bias_m: bias_m(self.to_reference),
-            rmse_m: self.reference_rmse_m,
-        };
-    }
+/// Adds the distances of the cloud of an estimate to the true surfaces, and to the map of a reference system if there is one.
+///
+/// # Errors
+/// If the recording cannot be read, if it cannot be aligned with the truth, or if the run is stopped.
+pub(super) fn compare_clouds(
+    recording: &RunRecording,
+    loops: &Loops,
+    simulation: &Simulation,
+    reference: Option<&ReferenceMap>,
+    watch: &ProgressMonitor,
+    results: &mut Results,
+) -> Result<(), RunError> {
+    let aligned = AlignedCloud::new(recording, loops, simulation, MAX_POINTS, watch)?;
+    let summary =
+        |surface: &dyn Surface, points: &[SeenPoint]| CloudErrors::to_surface(surface, points, REACH_M).summary();
+    let to_reference = reference.and_then(|reference| summary(&reference.cloud, &aligned.estimated));
+    let to_truth = summary(simulation.world(), &aligned.estimated);
+    let cloud = &mut results.metrics.cloud;
+    (cloud.sigma_m, cloud.bias_m) = (to_truth.map(|cloud| cloud.sigma_m), to_truth.map(|cloud| cloud.bias_m));
+    cloud.sigma_by_truth_m = summary(simulation.world(), &aligned.by_truth).map(|cloud| cloud.sigma_m);
+    results.reference = ReferenceResults {
+        sigma_m: to_reference.map(|cloud| cloud.sigma_m),
+        bias_m: to_reference.map(|cloud| cloud.bias_m),
+        rmse_m: reference.map(|reference| reference.rmse_m),
+    };
+    Ok(())
 }

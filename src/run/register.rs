@@ -3,21 +3,23 @@
 use super::RunError;
 use super::beams::{BeamReader, EstimatedBeams, LidarModel, ProjectedBeam};
 use super::cloud_files::{CloudFiles, CloudOptions};
+use super::loops::{BestEstimate, Loops};
 use super::truth_cursor::{TrueState, TruthCursor};
 use super::viewer_files::write_for_result;
 use std::path::Path;
-use zsim_base::geometry::{PoseCovariance, Trajectory, Vector};
-use zsim_base::measurement::{Calibration, LidarCorrection, LidarNoise, LidarReturn, LidarScan};
+use zsim_base::geometry::{PoseCovariance, Vector};
+use zsim_base::measurement::{LidarNoise, LidarReturn, LidarScan};
 use zsim_base::time::Stamp;
 use zsim_estimation::{CloudFilter, ProjectedReturn, ReturnClass, point_sigma_m};
 use zsim_evaluation::Thinning;
-use zsim_recording::{CloudPoint, RecordingError, ResultWriter};
+use zsim_recording::{CloudPoint, FoundCalibration, RecordingError, ResultWriter};
 use zsim_report::page::MAX_PAGE_POINTS;
 
 /// Maximum number of beams in the sample for the evaluation.
 const MAX_SAMPLED_BEAMS: usize = 100_000;
 /// Maximum number of points for viewers, in `result.mcap`; the cloud files have all points.
 const MAX_VIEWER_POINTS: usize = 1_000_000;
+
 /// A beam of the sample for the evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampledBeam {
@@ -29,81 +31,16 @@ pub(super) struct SampledBeam {
     pub class: ReturnClass,
 }
 
-/// Number of returns by decision of the outlier filter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct ClassCounts {
-    pub kept: u64,
-    pub mixed: u64,
-    pub isolated: u64,
-    pub moving: u64,
-}
-
-impl ClassCounts {
-    /// Total number of returns.
-    pub(super) fn all(&self) -> u64 {
-        self.kept + self.mixed + self.isolated + self.moving
-    }
-
-    fn count(&mut self, class: ReturnClass) {
-        *match class {
-            ReturnClass::Static => &mut self.kept,
-            ReturnClass::MixedPixel => &mut self.mixed,
-            ReturnClass::Isolated => &mut self.isolated,
-            ReturnClass::Dynamic => &mut self.moving,
-        } += 1;
-    }
-}
-
 /// Result of the registration, from a second pass over the recording.
 pub(super) struct RegisteredCloud {
-    /// Number of returns by decision of the filter.
-    pub class_counts: ClassCounts,
+    /// Number of returns by decision of the filter, in the order of [`ReturnClass`].
+    pub class_counts: [u64; 4],
     /// Whether the cloud was filtered.
     pub filtered: bool,
     /// A sample of the beams, before filtering.
     pub sample: Vec<SampledBeam>,
     /// Points for the page, after filtering.
     pub page_points: Vec<CloudPoint>,
-}
-
-/// Inputs of the registration.
-#[derive(Clone, Copy)]
-pub(super) struct Registration<'a> {
-    pub calibration: &'a Calibration,
-    pub body_frame: &'a str,
-    pub map_from_head: &'a Trajectory,
-    pub covariances: &'a [(Stamp, PoseCovariance)],
-    /// Estimated correction of the lidar calibration.
-    pub lidar: &'a LidarCorrection,
-    /// Number of returns in the recording.
-    pub returns: usize,
-    /// Options of the cloud.
-    pub options: CloudOptions,
-}
-
-impl<'a> Registration<'a> {
-    /// Creates the files of the cloud, `result.mcap` and its layout in `folder`, and the reader of beams that writes them.
-    pub(super) fn start(self, folder: &Path) -> Result<CloudRegistration<'a>, RunError> {
-        let noise = self.calibration.lidar;
-        write_for_result(folder)?;
-        let result = folder.join("result.mcap");
-        Ok(CloudRegistration {
-            estimate: EstimatedBeams::new(self.map_from_head, self.calibration, self.lidar),
-            calibrated: LidarModel::calibrated(self.calibration),
-            noise,
-            covariances: self.covariances,
-            filter: (!self.options.keep_outliers).then(|| CloudFilter::new(noise)),
-            files: CloudFiles::create(folder, self.options.format)?,
-            result: ResultWriter::create(&result, self.body_frame, self.map_from_head, self.covariances)?,
-            sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, self.returns),
-            displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, self.returns),
-            on_page: Thinning::to_at_most(MAX_PAGE_POINTS, self.returns),
-            projected: 0,
-            class_counts: ClassCounts::default(),
-            sample: Vec::new(),
-            page_points: Vec::new(),
-        })
-    }
 }
 
 /// A beam projected by the estimate and by the truth.
@@ -136,7 +73,7 @@ pub(super) struct CloudRegistration<'a> {
     on_page: Thinning,
     /// Number of projected returns.
     projected: usize,
-    class_counts: ClassCounts,
+    class_counts: [u64; 4],
     sample: Vec<SampledBeam>,
     page_points: Vec<CloudPoint>,
 }
@@ -155,7 +92,35 @@ impl BeamReader for CloudRegistration<'_> {
     }
 }
 
-impl CloudRegistration<'_> {
+impl<'a> CloudRegistration<'a> {
+    /// Creates the files of the cloud of the best estimate, `result.mcap` and its layout in `folder`.
+    pub(super) fn start(
+        found: &'a FoundCalibration,
+        loops: &'a Loops,
+        options: CloudOptions,
+        folder: &Path,
+    ) -> Result<Self, RunError> {
+        let BestEstimate { map_from_head, covariances, lidar, .. } = loops.best();
+        let (calibration, returns) = (&found.calibration, loops.open.returns);
+        write_for_result(folder)?;
+        Ok(Self {
+            estimate: EstimatedBeams::new(map_from_head, calibration, lidar),
+            calibrated: LidarModel::calibrated(calibration),
+            noise: calibration.lidar,
+            covariances,
+            filter: (!options.keep_outliers).then(|| CloudFilter::new(calibration.lidar)),
+            files: CloudFiles::create(folder, options.format)?,
+            result: ResultWriter::create(&folder.join("result.mcap"), &found.body_frame, map_from_head, covariances)?,
+            sampled: Thinning::to_at_most(MAX_SAMPLED_BEAMS, returns),
+            displayed: Thinning::to_at_most(MAX_VIEWER_POINTS, returns),
+            on_page: Thinning::to_at_most(MAX_PAGE_POINTS, returns),
+            projected: 0,
+            class_counts: [0; 4],
+            sample: Vec::new(),
+            page_points: Vec::new(),
+        })
+    }
+
     /// Writes the remaining points and completes the files.
     pub(super) fn finish(mut self) -> Result<RegisteredCloud, RunError> {
         let filtered = self.filter.is_some();
@@ -206,7 +171,7 @@ impl CloudRegistration<'_> {
     /// Counts the decisions and writes the accepted points.
     fn settle(&mut self, decided: Vec<(Pending, ReturnClass)>) -> Result<(), RecordingError> {
         for (pending, class) in decided {
-            self.class_counts.count(class);
+            self.class_counts[class as usize] += 1;
             self.sample.extend(pending.sampled.map(|pair| SampledBeam { in_map: pair.0, by_truth: pair.1, class }));
             if class == ReturnClass::Static {
                 self.files.point(&pending.point)?;

@@ -3,9 +3,10 @@
 use super::calibration::calibration;
 use super::loops::Loops;
 use super::open_loop::LoopInputs;
-use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError, RunInputs};
+use super::{CalibrationSpec, Manifest, ProgressMonitor, RunError};
 use std::fs::File;
 use zsim_base::measurement::Calibration;
+use zsim_estimation::EstimatorSpec;
 use zsim_recording::{Reader, Selection, TopicPreference};
 
 /// A recording of a run, read by one thread.
@@ -32,7 +33,7 @@ impl RunRecording {
     /// When the recording cannot be read, the estimation fails, or the run is stopped.
     pub(super) fn estimate(
         &self,
-        inputs: &RunInputs,
+        estimator: &EstimatorSpec,
         closes_loops: bool,
         watch: &mut ProgressMonitor,
     ) -> Result<Loops, RunError> {
@@ -40,7 +41,7 @@ impl RunRecording {
             reader: &self.reader,
             selection: &self.selection,
             calibration: &self.calibration,
-            estimator: &inputs.estimator.spec,
+            estimator,
             map: None,
             closes_loops,
             keeps_surfels: false,

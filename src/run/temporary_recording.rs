@@ -1,10 +1,12 @@
 //! Runs that share a simulation and its recording in a temporary file.
 
 use super::bound::information_bound;
-use super::estimated_run::{EstimatedRun, estimate};
+use super::clock_curve::ClockCurve;
 use super::record::{description, record_together};
-use super::reference_system::ReferenceMap;
+use super::reference_system::{ReferenceMap, compare_clouds};
 use super::results::{Needs, Results, Swing};
+use super::run_recording::RunRecording;
+use super::sampled_truth::SampledTruth;
 use super::timing::{MapErrors, Reference, TimingRun, TimingSpec};
 use super::{ProgressMonitor, ReferenceInputs, RunError, RunInputs};
 use std::fs::File;
@@ -13,13 +15,13 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use zsim_base::files::FileError;
-use zsim_base::measurement::Calibration;
+use zsim_base::geometry::Trajectory;
 use zsim_base::spec;
-use zsim_dynamics::{ContactWatch, HeadState};
+use zsim_dynamics::{ContactWatch, HeadModel, HeadState};
 use zsim_estimation::EstimatorSpec;
-use zsim_evaluation::MapKnowledge;
+use zsim_evaluation::{Errors, MapKnowledge, Pairs};
 use zsim_head::coverage::{CoveragePlan, coverage};
-use zsim_recording::{Reader, Selection, TopicPreference, Writer};
+use zsim_recording::{Reader, TopicPreference, Writer};
 use zsim_simulation::Simulation;
 
 /// Maximum number of recordings written at once; bounds memory and temporary disk space.
@@ -106,25 +108,43 @@ impl TemporaryRecording {
         };
         let file = handle.try_clone().map_err(FileError::at(&std::env::temp_dir()))?;
         if let Some(timing) = &run.timing {
-            let work = |stop: &AtomicBool| self.map_errors(file, timing, &run.estimator.spec, stop);
-            let errors = with_time_limit(limit_s, work)?;
+            let errors = alone(limit_s, |watch| self.map_errors(file, timing, &run.estimator.spec, watch.stop))?;
             let results = Results { metrics: errors.metrics(), swing, ..Results::default() };
             return Ok((results, Some(spec::to_text(&errors)?)));
         }
-        let estimated = EstimatedRun {
-            simulation: &self.simulation,
-            inputs: run,
-            closes_loops: any(Needs::is_of_closed_loop),
-            slam_bound_m: compared.slam_bound_m,
-            compares_clouds: any(|need| matches!(need, Needs::Cloud | Needs::Reference)),
-            reference: compared.reference.as_deref(),
-        };
-        let (results, curve) = with_time_limit(limit_s, |stop| estimate(file, &estimated, stop))?;
+        let (results, curve) = alone(limit_s, |watch| self.estimate(file, run, &any, compared, watch))?;
         let curve = curve.filter(|_| any(|need| need == Needs::ClockCurve));
         Ok((Results { swing, ..results }, curve.as_ref().map(spec::to_text).transpose()?))
     }
 
-    /// Estimates with timing errors on one thread, and evaluates the result.
+    /// Estimates from the recording; returns the results, and the clock offset over time if the truth is known.
+    fn estimate(
+        &self,
+        recording: File,
+        run: &RunInputs,
+        needs: &dyn Fn(fn(Needs) -> bool) -> bool,
+        compared: &Compared,
+        watch: &mut ProgressMonitor,
+    ) -> Result<(Results, Option<ClockCurve>), RunError> {
+        let recording = RunRecording::open(recording, run.ignore_manifest)?;
+        let loops = recording.estimate(&run.estimator.spec, needs(Needs::is_of_closed_loop), watch)?;
+        let truth = loops.truth.as_ref();
+        let estimate = &loops.open.estimate;
+        let mut results = Results {
+            metrics: loops.metrics(&loops.integrity(), loops.pairs().as_ref()),
+            rigid_link_rmse_m: truth
+                .and_then(|truth| rigid_link_rmse_m(self.simulation.head(), &estimate.trajectory, truth)),
+            slam_bound_m: compared.slam_bound_m,
+            ..Results::default()
+        };
+        if needs(|need| matches!(need, Needs::Cloud | Needs::Reference)) {
+            let reference = compared.reference.as_deref();
+            compare_clouds(&recording, &loops, &self.simulation, reference, watch, &mut results)?;
+        }
+        Ok((results, truth.map(|truth| ClockCurve::new(&estimate.clock_offsets, &truth.clock_offsets))))
+    }
+
+    /// Estimates with timing errors, and evaluates the result.
     fn map_errors(
         &self,
         recording: File,
@@ -134,73 +154,41 @@ impl TemporaryRecording {
     ) -> Result<MapErrors, RunError> {
         let reader = Reader::new("the recording", recording)?;
         let selection = reader.select(&TopicPreference::default())?;
-        let calibration = self.simulation.calibration();
-        let reference = self.reference(&reader, &selection, &calibration, timing.shown_s, stop)?;
-        let run = TimingRun {
-            reader: &reader,
-            selection: &selection,
-            calibration: &calibration,
-            simulation: &self.simulation,
-            reference: &reference,
-            timing,
-        };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-        pool.install(|| run.evaluate(estimator, stop))
+        let recording = RunRecording { reader, selection, calibration: self.simulation.calibration() };
+        let (_, reference) = once(
+            &self.reference,
+            |(shown_s, _)| *shown_s == timing.shown_s,
+            || {
+                let reference = Reference::read(&recording, &self.simulation, timing.shown_s, stop)?;
+                Ok((timing.shown_s, Arc::new(reference)))
+            },
+        )?;
+        let run = TimingRun { recording: &recording, simulation: &self.simulation, reference: &reference, timing };
+        run.evaluate(estimator, stop)
     }
 
-    /// Ground truth for maps of `shown_s`; read once, while other threads wait for it.
-    fn reference(
-        &self,
-        reader: &Reader,
-        selection: &Selection,
-        calibration: &Calibration,
-        shown_s: f64,
-        stop: &AtomicBool,
-    ) -> Result<Arc<Reference>, RunError> {
-        let mut stored = self.reference.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, reference)) = stored.as_ref().filter(|(stored_s, _)| *stored_s == shown_s) {
-            return Ok(reference.clone());
-        }
-        let read = Reference::read(reader, selection, calibration, &self.simulation, shown_s, stop);
-        let reference = Arc::new(read?);
-        *stored = Some((shown_s, reference.clone()));
-        Ok(reference)
-    }
-
-    /// The information bound with an unknown map, m; computed once, on one thread, while other threads wait for it.
+    /// The information bound with an unknown map, m; computed once.
     fn slam_bound_m(&self, limit_s: f64, reader: usize) -> Result<Option<f64>, RunError> {
         let Some(handle) = self.handles.get(reader) else { return Ok(None) };
-        let mut stored = self.slam_bound_m.lock().unwrap_or_else(PoisonError::into_inner);
-        if stored.is_none() {
+        let bound_m = || {
             let file = handle.try_clone().map_err(FileError::at(&std::env::temp_dir()))?;
             let reader = Reader::new("the recording", file)?;
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-            let bounded = with_time_limit(limit_s, |stop| {
-                let world = self.simulation.world();
-                pool.install(|| {
-                    let mut watch = ProgressMonitor { stop, report: &mut |_| {} };
-                    information_bound(&reader, world, MapKnowledge::Unknown, &mut watch)
-                })
-            })?;
-            *stored = Some(bounded.bound.aligned_position_rmse_m);
-        }
-        Ok(*stored)
+            let world = self.simulation.world();
+            let bounded = alone(limit_s, |watch| information_bound(&reader, world, MapKnowledge::Unknown, watch))?;
+            Ok(bounded.bound.aligned_position_rmse_m)
+        };
+        once(&self.slam_bound_m, |_| true, bound_m).map(Some)
     }
 
-    /// The map of a reference system; computed once, while other threads wait for it.
+    /// The map of a reference system; computed once.
     fn reference_map(
         &self,
         limit_s: f64,
         inputs: &ReferenceInputs,
         run: &RunInputs,
     ) -> Result<Arc<ReferenceMap>, RunError> {
-        let mut stored = self.reference_map.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(map) = stored.as_ref().filter(|map| map.is_of(inputs, run)) {
-            return Ok(map.clone());
-        }
-        let map = Arc::new(with_time_limit(limit_s, |stop| ReferenceMap::of(inputs, run, stop))?);
-        *stored = Some(map.clone());
-        Ok(map)
+        let map = || Ok(Arc::new(alone(limit_s, |watch| ReferenceMap::of(inputs, run, watch))?));
+        once(&self.reference_map, |map| map.is_of(inputs, run), map)
     }
 
     /// The swing from 5 s (after the rest at the start) to the run's end.
@@ -220,11 +208,40 @@ impl TemporaryRecording {
     }
 }
 
+/// Returns the stored value if it is valid, else computes and stores it, while other threads wait for it.
+fn once<T: Clone>(
+    stored: &Mutex<Option<T>>,
+    is_valid: impl FnOnce(&T) -> bool,
+    compute: impl FnOnce() -> Result<T, RunError>,
+) -> Result<T, RunError> {
+    let mut stored = stored.lock().unwrap_or_else(PoisonError::into_inner);
+    match stored.take().filter(is_valid) {
+        Some(value) => Ok(stored.insert(value).clone()),
+        None => Ok(stored.insert(compute()?).clone()),
+    }
+}
+
+/// Position error of the base computed with the rigid link, as `zsim base` does; `None` without a true trajectory of it.
+fn rigid_link_rmse_m(head: &HeadModel, map_from_head: &Trajectory, truth: &SampledTruth) -> Option<f64> {
+    let base = Trajectory::from_poses(head.base_from_rigid_link(map_from_head)).ok()?;
+    let pairs = Pairs::of(&base, &truth.bases);
+    Some(Errors::after(&pairs, &pairs.world_from_map().ok()?).position_rmse_m())
+}
+
 /// What a run is compared with.
 pub struct Compared {
     /// Information bound with an unknown map, m.
     slam_bound_m: Option<f64>,
     reference: Option<Arc<ReferenceMap>>,
+}
+
+/// Does `work` on one thread within the time limit.
+fn alone<T: Send>(
+    limit_s: f64,
+    work: impl FnOnce(&mut ProgressMonitor) -> Result<T, RunError> + Send,
+) -> Result<T, RunError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    with_time_limit(limit_s, |stop| pool.install(|| work(&mut ProgressMonitor { stop, report: &mut |_| {} })))
 }
 
 /// Does `work`, and sets its stop flag when the time limit is exceeded.

@@ -2,18 +2,16 @@
 
 use super::reference::{Reference, SampledReturn};
 use super::stamp_errors::DisturbedStamps;
-use super::{Block, pooled};
-use super::{ClockState, TimingSpec};
+use super::{Block, ClockState, TimingSpec, pooled};
 use crate::RunError;
+use crate::run_recording::RunRecording;
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use zsim_base::geometry::{Pose, SmoothCursor, Trajectory, Vector};
-use zsim_base::measurement::Calibration;
-use zsim_base::parallel::Stopped;
+use zsim_base::parallel::check;
 use zsim_base::time::Stamp;
 use zsim_estimation::{ClockSpec, Estimator, EstimatorSpec, OpenLoop, smoothed_stamps};
 use zsim_evaluation::{CloudErrors, Errors, Pairs};
-use zsim_recording::{Reader, Selection};
 use zsim_report::Metrics;
 use zsim_simulation::Simulation;
 
@@ -59,9 +57,7 @@ impl MapErrors {
 
 /// A recording that is estimated with a timing error.
 pub(crate) struct TimingRun<'a> {
-    pub reader: &'a Reader,
-    pub selection: &'a Selection,
-    pub calibration: &'a Calibration,
+    pub recording: &'a RunRecording,
     pub simulation: &'a Simulation,
     pub reference: &'a Reference,
     pub timing: &'a TimingSpec,
@@ -102,7 +98,7 @@ impl TimingRun<'_> {
                 projected.map_or((f64::NAN, f64::NAN), |(point, _)| self.reference.section.coordinates(&point));
             (along as f32, up as f32)
         };
-        let shown = cloud.project(&self.reference.shown, &self.calibration.head_from_laser);
+        let shown = cloud.project(&self.reference.shown, &self.recording.calibration.head_from_laser);
         Section {
             range_m: self.reference.range_m,
             points_m: shown.into_iter().map(coordinates).collect(),
@@ -117,11 +113,10 @@ impl TimingRun<'_> {
         timing: &DisturbedStamps<'_>,
         stop: &AtomicBool,
     ) -> Result<OpenLoop, RunError> {
-        let mut estimator = Estimator::new(spec, self.calibration)?;
-        for measurement in timing.apply(self.reader.measurements(self.selection)) {
-            if stop.load(Ordering::Relaxed) {
-                return Err(Stopped.into());
-            }
+        let RunRecording { reader, selection, calibration } = self.recording;
+        let mut estimator = Estimator::new(spec, calibration)?;
+        for measurement in timing.apply(reader.measurements(selection)) {
+            check(stop)?;
             estimator.push(measurement?)?;
         }
         Ok(estimator.finish()?)
@@ -130,7 +125,7 @@ impl TimingRun<'_> {
     /// Adds the distances of the cloud to the true surfaces.
     fn evaluate_cloud(&self, cloud: &EstimatedCloud<'_>, blocks: &mut Vec<Block>) {
         let returns = &self.reference.evaluated;
-        let projected = cloud.project(returns, &self.calibration.head_from_laser);
+        let projected = cloud.project(returns, &self.recording.calibration.head_from_laser);
         for (hit, (point, origin)) in returns.iter().zip(projected).filter_map(|(hit, ends)| Some((hit, ends?))) {
             let found = CloudErrors::to_surface(self.simulation.world(), &[(point, Some(origin))], REACH_M);
             if let Some(distance_m) = found.signed_m.first() {

@@ -4,16 +4,16 @@ use super::cross_section::CrossSection;
 use crate::RunError;
 use crate::beams::{BeamReader, read_beams};
 use crate::cloud::Surroundings;
+use crate::run_recording::RunRecording;
 use crate::true_clock::TrueClock;
 use crate::truth_cursor::TruthCursor;
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 use zsim_base::geometry::{Pose, Trajectory, Vector};
-use zsim_base::measurement::{Calibration, LidarScan};
+use zsim_base::measurement::LidarScan;
 use zsim_base::parallel::check;
 use zsim_base::time::{Span, Stamp};
 use zsim_evaluation::Thinning;
-use zsim_recording::{Reader, Selection};
 use zsim_simulation::Simulation;
 
 /// Approximate number of returns for the cloud's errors: the computing time of an evaluation is proportional to it.
@@ -69,13 +69,12 @@ pub(crate) struct Reference {
 impl Reference {
     /// Reads the recording of `simulation`; the section has the returns of the middle `shown_s`.
     pub(crate) fn read(
-        reader: &Reader,
-        selection: &Selection,
-        calibration: &Calibration,
+        recording: &RunRecording,
         simulation: &Simulation,
         shown_s: f64,
         stop: &AtomicBool,
     ) -> Result<Self, RunError> {
+        let RunRecording { reader, selection, calibration } = recording;
         let truth = reader.truth_trajectory()?;
         let Some(section) = CrossSection::through(&truth, shown_s) else {
             let message = "the recording has no ground truth".to_owned();
