@@ -2,7 +2,6 @@
 
 use super::{Content, Document, Part, Plot};
 use crate::page::html::{self, escaped};
-use crate::page::interactive::Interactive;
 use crate::page::scripts::{DATA, READY, TABLES};
 use crate::page::table::{linked, table};
 
@@ -16,20 +15,21 @@ impl Document {
             Content::Interactive(interactive) => Some(interactive),
             _ => None,
         });
-        html::Page {
-            kind: interactive.map_or("paper", Interactive::kind),
+        let page = html::Page {
+            kind: "paper",
             title: &self.title,
-            status: "",
-            introduction: &format!("<p class=\"summary\">{}</p>", escaped(&self.summary)),
-            without_scripts: interactive
-                .map_or("Sorting the tables needs scripts; nothing else does.", Interactive::without_scripts),
-            sections: &self.sections(),
+            introduction: format!("<p class=\"summary\">{}</p>", escaped(&self.summary)),
+            without_scripts: "Sorting the tables needs scripts; nothing else does.",
+            sections: self.sections(),
             footer: &self.footer,
-            version: env!("CARGO_PKG_VERSION"),
-            data: &interactive.map_or_else(|| "{}".to_owned(), Interactive::data),
-            scripts: interactive.map_or(&[DATA, TABLES, READY], Interactive::scripts),
+            data: "{}".to_owned(),
+            scripts: &[DATA, TABLES, READY],
+            ..html::Page::default()
+        };
+        match interactive {
+            Some(interactive) => interactive.complete(page).html(),
+            None => page.html(),
         }
-        .html()
     }
 
     /// The parts, in a section for each heading.
@@ -93,6 +93,7 @@ fn width_of(svg: &str) -> f64 {
 mod tests {
     use super::*;
     use crate::Table;
+    use crate::page::Interactive;
     use crate::page::{PointColumn, RunPoints};
 
     #[test]

@@ -36,6 +36,7 @@ pub(crate) fn fill(template: &str, values: &[(&str, &str)]) -> String {
 pub(crate) const LIVE: &str = "live";
 
 /// Everything that differs between pages; the shell is the same.
+#[derive(Default)]
 pub(crate) struct Page<'a> {
     /// Kind of the page, which the scripts read.
     pub kind: &'a str,
@@ -44,17 +45,17 @@ pub(crate) struct Page<'a> {
     /// Status of the verdict, as text; empty without one.
     pub status: &'a str,
     /// First paragraph, as HTML.
-    pub introduction: &'a str,
+    pub introduction: String,
     /// What works without scripts, as text.
     pub without_scripts: &'a str,
     /// Sections, as HTML.
-    pub sections: &'a str,
+    pub sections: String,
     /// Last line, as text.
     pub footer: &'a str,
-    /// Version of zsim that made the data.
-    pub version: &'a str,
+    /// Version of zsim that made the data; `None` for this one.
+    pub version: Option<&'a str>,
     /// Data of the scripts: JSON without `<`, `>` and `&`.
-    pub data: &'a str,
+    pub data: String,
     /// Scripts in the order of their dependencies.
     pub scripts: &'a [&'a str],
 }
@@ -70,12 +71,12 @@ impl Page<'_> {
                 ("title", &escaped(self.title)),
                 ("status", &escaped(self.status)),
                 ("style", STYLE),
-                ("introduction", self.introduction),
+                ("introduction", &self.introduction),
                 ("without_scripts", &escaped(self.without_scripts)),
-                ("sections", self.sections),
+                ("sections", &self.sections),
                 ("footer", &escaped(self.footer)),
-                ("version", &escaped(self.version)),
-                ("data", self.data),
+                ("version", &escaped(self.version.unwrap_or(env!("CARGO_PKG_VERSION")))),
+                ("data", &self.data),
                 ("script", &self.scripts.join("\n")),
             ],
         )

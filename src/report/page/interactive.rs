@@ -7,6 +7,7 @@ use super::scripts::{CHARTS, DATA, LIBRARIES, MODES, POINTS, READY, RUNS, TABLES
 use super::stage::Stage;
 use super::{encode, table};
 use crate::Table;
+use serde_json::json;
 
 const SPRING: &str = include_str!("assets/spring.html");
 const MODES_CONTROLS: &str = include_str!("assets/modes.html");
@@ -42,39 +43,33 @@ pub struct AxisGains {
 }
 
 impl Interactive {
-    /// Kind of the page, which the tests read.
-    pub(crate) fn kind(&self) -> &'static str {
+    /// The page with the kind, the data and the scripts of the part; the tests read the kind.
+    pub(crate) fn complete<'a>(&self, page: html::Page<'a>) -> html::Page<'a> {
         match self {
-            Self::Gains(_) => "gains",
-            Self::Spring(_) => "spring",
-            Self::Runs { .. } => "study",
-        }
-    }
-
-    /// What works without scripts.
-    pub(crate) fn without_scripts(&self) -> &'static str {
-        match self {
-            Self::Gains(_) => "The charts need scripts. The folder plots/ has them as pictures.",
-            Self::Spring(_) => "The three-dimensional view needs scripts; the tables do not.",
-            Self::Runs { .. } => "Sorting and filtering need scripts; the tables and plots do not.",
-        }
-    }
-
-    /// The scripts in the order of their dependencies.
-    pub(crate) fn scripts(&self) -> &'static [&'static str] {
-        match self {
-            Self::Gains(_) => &[LIBRARIES, DATA, CHARTS, TABLES, READY],
-            Self::Spring(_) => &MODES,
-            Self::Runs { .. } => &[DATA, TABLES, RUNS, POINTS, READY],
-        }
-    }
-
-    /// The data of the scripts: JSON that is inert within a `<script>` element.
-    pub(crate) fn data(&self) -> String {
-        match self {
-            Self::Gains(axes) => encode::charts_json(axes.iter().flat_map(|axis| &axis.groups)),
-            Self::Spring(view) => encode::spring_json(view),
-            Self::Runs { points, .. } => points.json(),
+            Self::Gains(axes) => {
+                let charts: Vec<&ChartGroup> = axes.iter().flat_map(|axis| &axis.groups).collect();
+                html::Page {
+                    kind: "gains",
+                    without_scripts: "The charts need scripts. The folder plots/ has them as pictures.",
+                    data: encode::inert(&json!({ "charts": charts }).to_string()),
+                    scripts: &[LIBRARIES, DATA, CHARTS, TABLES, READY],
+                    ..page
+                }
+            }
+            Self::Spring(view) => html::Page {
+                kind: "spring",
+                without_scripts: "The three-dimensional view needs scripts; the tables do not.",
+                data: encode::inert(&json!(view).to_string()),
+                scripts: &MODES,
+                ..page
+            },
+            Self::Runs { points, .. } => html::Page {
+                kind: "study",
+                without_scripts: "Sorting and filtering need scripts; the tables and plots do not.",
+                data: points.json(),
+                scripts: &[DATA, TABLES, RUNS, POINTS, READY],
+                ..page
+            },
         }
     }
 

@@ -47,23 +47,22 @@ impl LivePage {
         html::Page {
             kind: html::LIVE,
             title: &self.title,
-            status: "",
-            introduction: &html::fill(SECTIONS, &[("verdicts", &verdicts)]),
+            introduction: html::fill(SECTIONS, &[("verdicts", &verdicts)]),
             without_scripts: "This page needs scripts.",
-            sections: &(view + EVENTS),
+            sections: view + EVENTS,
             footer: "Points are thinned for this page; the report and cloud.ply have all of them.",
-            version: env!("CARGO_PKG_VERSION"),
-            data: &self.data(),
+            data: self.data(),
             scripts: &scripts,
+            ..html::Page::default()
         }
         .html()
     }
 
     /// The data of the view, without points; their codes refer to the volume.
     fn data(&self) -> String {
-        let mut data = encode::view(&self.view);
-        data["cloud"]["lower"] = json!(encode::numbers(&self.volume.lower));
-        data["cloud"]["upper"] = json!(encode::numbers(&self.volume.upper));
+        let mut data = self.view.json();
+        data["cloud"]["lower"] = json!(self.volume.lower);
+        data["cloud"]["upper"] = json!(self.volume.upper);
         data["cloud"]["duration"] = json!(Volume::duration_s());
         data["capacity"] = json!({ "points": MAX_PAGE_POINTS, "poses": MAX_PAGE_POSES });
         encode::inert(&data.to_string())

@@ -4,18 +4,17 @@
 //! scene the view, the floor plan and the materials; that of a document its parts, of which one may be interactive.
 //! Scripts, style sheets and data are in the file. A content security policy forbids network access. The page of a run that is not complete is an exception: it requests updates from the server that it is from.
 
-mod binary;
 mod data;
-mod encode;
+pub(crate) mod encode;
+mod fields;
 pub(crate) mod html;
 pub(crate) mod interactive;
 pub mod links;
 mod live;
 mod points;
 mod quantise;
-mod scene;
 pub(crate) mod scripts;
-mod stage;
+pub(crate) mod stage;
 mod surfaces;
 pub(crate) mod table;
 mod update;
@@ -23,10 +22,13 @@ mod update;
 use crate::rows;
 pub use data::{
     Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Link, Ordinate, RunPage, Section, ShownMode,
-    SpringView, TimedPose, TimelineRow, View, ViewPoint,
+    SpringView, TimelineRow, View,
 };
+pub use encode::TimedPose;
 pub use interactive::{AxisGains, Interactive, MAX_PAGE_RUNS};
 pub use live::LivePage;
+pub use quantise::ViewPoint;
+use serde_json::json;
 
 /// Maximum number of points of the cloud on a page.
 ///
@@ -38,7 +40,6 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 pub const MAX_PAGE_POSES: usize = 20_000;
 
 pub use points::{PointColumn, RunPoints};
-pub use scene::ScenePage;
 pub use surfaces::static_surfaces;
 pub(crate) use surfaces::{Triangle, area_m2, largest};
 pub use update::{Increment, LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TruePoses, Volume};
@@ -48,6 +49,9 @@ impl RunPage<'_> {
     /// The HTML of the page; the same data give the same bytes.
     pub fn html(&self) -> String {
         let metrics = self.metrics;
+        let mut data = self.view.json();
+        data["charts"] = json!(self.charts);
+        data["timeline"] = self.timeline.iter().map(TimelineRow::json).collect();
         let sections = html::fill(
             RUN_SECTIONS,
             &[
@@ -60,12 +64,12 @@ impl RunPage<'_> {
             kind: "run",
             title: &rows::title(metrics),
             status: metrics.status.as_deref().unwrap_or_default(),
-            introduction: &html::verdict(metrics),
+            introduction: html::verdict(metrics),
             without_scripts: "The three-dimensional view and the charts need scripts. The folder plots/ has the plots as pictures.",
-            sections: &(stage::view_section("Trajectory and cloud", "estimate", "head") + &sections),
+            sections: stage::view_section("Trajectory and cloud", "estimate", "head") + &sections,
             footer: "Lines of the charts mark the time of the view; click on a chart to move to that time.",
-            version: &metrics.version,
-            data: &encode::run_json(self),
+            version: Some(&metrics.version),
+            data: encode::inert(&data.to_string()),
             scripts: &scripts::VIEW,
         }
         .html()

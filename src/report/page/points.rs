@@ -1,13 +1,14 @@
 //! Runs as points over two columns.
 
-use super::binary::base64_f32;
 use super::encode::inert;
+use super::fields;
+use serde::Serialize;
 use serde_json::json;
 
 /// The runs of a study as points: any two columns can be plotted against each other.
 ///
 /// The rows are those of the table of the runs on the same page.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RunPoints {
     /// Numeric columns.
     pub columns: Vec<PointColumn>,
@@ -22,20 +23,18 @@ pub struct RunPoints {
 }
 
 /// A numeric column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PointColumn {
     /// Label, with the unit.
     pub label: String,
     /// One value per row; not finite if it is missing.
+    #[serde(serialize_with = "fields::numbers")]
     pub values: Vec<f64>,
 }
 
 impl RunPoints {
     /// The points as JSON that is inert within a `<script>` element.
     pub(super) fn json(&self) -> String {
-        let column = |column: &PointColumn| json!({ "label": column.label, "values": base64_f32(column.values.iter().copied()) });
-        let columns: Vec<_> = self.columns.iter().map(column).collect();
-        let (x, y, front, folder) = (self.x, self.y, &self.front, &self.folder);
-        inert(&json!({ "columns": columns, "x": x, "y": y, "front": front, "folder": folder }).to_string())
+        inert(&json!(self).to_string())
     }
 }

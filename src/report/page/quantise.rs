@@ -1,7 +1,7 @@
 //! Quantises the points of the view: 16 bits a coordinate and time, 8 bits a colour.
 
-use super::binary::base64_bytes;
-use super::data::ViewPoint;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use zsim_base::geometry::Vector;
 
@@ -11,6 +11,25 @@ const UNKNOWN: u8 = 255;
 const MAX_CODE: f64 = 254.0;
 /// Fraction of the points with the smallest and the largest values, beyond the colour scale.
 const TAIL: f64 = 0.01;
+
+/// A point of the cloud with the quantities that can colour it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ViewPoint {
+    /// Position, m.
+    pub position: Vector,
+    /// Time, s.
+    pub t_s: f64,
+    /// Intensity of the return, in the unit of the lidar.
+    pub intensity: f64,
+    /// Angular velocity of the head, degrees/s.
+    pub turn_rate_deg_per_s: f64,
+    /// Estimated standard deviation of the position, m; NaN if it is not known.
+    pub sigma_m: f64,
+    /// Signed distance from the nearest true surface, positive towards the lidar, m; NaN if it is not known.
+    pub error_m: f64,
+    /// Index of the material of the nearest true surface.
+    pub material: Option<usize>,
+}
 
 /// The points as arrays of codes, with the ranges that decode them.
 pub(super) fn cloud(points: &[ViewPoint]) -> Value {
@@ -24,9 +43,9 @@ pub(super) fn cloud(points: &[ViewPoint]) -> Value {
         "lower": [lower.x, lower.y, lower.z],
         "upper": [upper.x, upper.y, upper.z],
         "duration": duration_s,
-        "position": base64_bytes(&positions),
-        "time": base64_bytes(&times),
-        "material": base64_bytes(&materials),
+        "position": STANDARD.encode(&positions),
+        "time": STANDARD.encode(&times),
+        "material": STANDARD.encode(&materials),
         "channels": {
             "intensity": channel(points, |point| point.intensity, Scale::Spread),
             "turn_rate": channel(points, |point| point.turn_rate_deg_per_s, Scale::FromZero),
@@ -97,7 +116,7 @@ fn channel(points: &[ViewPoint], quantity: fn(&ViewPoint) -> f64, scale: Scale) 
         false => UNKNOWN,
     };
     let codes: Vec<u8> = points.iter().map(|point| code(quantity(point))).collect();
-    json!({ "lower": lower, "upper": upper, "codes": base64_bytes(&codes) })
+    json!({ "lower": lower, "upper": upper, "codes": STANDARD.encode(codes) })
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ impl Stage<'_> {
 }
 
 /// The view of a run or a scene; `path` names its path, and `path_of` what moves along it.
-pub(super) fn view_section(title: &str, path: &str, path_of: &str) -> String {
+pub(crate) fn view_section(title: &str, path: &str, path_of: &str) -> String {
     let stage = Stage {
         title,
         overlays: "<p id=\"closeup-label\" class=\"tag\" hidden>Head and spring</p>\n",

@@ -1,11 +1,12 @@
 //! Updates of the page of a run that is not complete, as JSON.
 
-use super::binary::base64_bytes;
-use super::data::TimedPose;
-use super::encode::path;
+use super::encode::{TimedPose, path};
 use super::html;
 use super::quantise::{positions, times};
 use crate::{Metrics, verdict};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
 use serde_json::{Value, json};
 use zsim_base::geometry::{Pose, Vector};
 
@@ -90,7 +91,7 @@ pub struct Increment<'a, T> {
 }
 
 /// The verdict, so far or final.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LiveVerdict {
     /// Status: `good`, `degraded` or `lost`.
     pub status: String,
@@ -108,7 +109,7 @@ impl LiveVerdict {
 }
 
 /// The end of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LiveEnd {
     /// What happened.
     pub sentence: String,
@@ -163,9 +164,9 @@ impl LiveUpdate<'_> {
             "truth": self.truth.json(json!({ "head": poses(|each| each.head), "base": poses(|each| each.base) })),
             "scans": self.scans.iter().map(|scan| scan.json(volume)).collect::<Vec<_>>(),
             "nextScan": self.next_scan,
-            "verdict": self.verdict.map(|verdict| json!({ "status": verdict.status, "reason": verdict.reason })),
+            "verdict": self.verdict,
             "events": self.events,
-            "end": self.end.map(|end| json!({ "sentence": end.sentence, "report": end.report })),
+            "end": self.end,
         }))
     }
 }
@@ -183,12 +184,12 @@ impl<T> Increment<'_, T> {
 impl LiveScan {
     fn json(&self, volume: &Volume) -> Value {
         let position = positions(self.points.iter().copied(), volume.lower, volume.upper);
-        json!({ "t": self.t_s, "position": base64_bytes(&position) })
+        json!({ "t": self.t_s, "position": STANDARD.encode(&position) })
     }
 }
 
 fn points(points: &[LivePoint], volume: &Volume) -> Value {
     let position = positions(points.iter().map(|point| point.position), volume.lower, volume.upper);
     let time = times(points.iter().map(|point| point.t_s), Volume::duration_s());
-    json!({ "position": base64_bytes(&position), "time": base64_bytes(&time) })
+    json!({ "position": STANDARD.encode(&position), "time": STANDARD.encode(&time) })
 }

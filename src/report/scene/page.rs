@@ -2,7 +2,8 @@
 
 use super::plan::{DEFAULT_CUT_M, plan};
 use crate::Table;
-use crate::page::{ScenePage, TimedPose, Triangle, View, area_m2, largest};
+use crate::page::table::named_values;
+use crate::page::{TimedPose, Triangle, View, area_m2, encode, html, largest, scripts, stage};
 use crate::plot::PlotError;
 use zsim_base::geometry::{Pose, Route, Vector};
 use zsim_world::{MaterialId, World};
@@ -18,14 +19,24 @@ const HEAD_HEIGHT_M: f64 = 1.0;
 /// When the plan cannot be drawn.
 pub fn page(world: &World) -> Result<String, PlotError> {
     let all: Vec<(Triangle, MaterialId)> = world.triangles().chain(world.moving_triangles(0.0)).collect();
-    let page = ScenePage {
-        name: world.name(),
-        properties: properties(world, all.len()),
-        materials: materials(world, &all),
-        plan: plan(world, DEFAULT_CUT_M),
-        view: view(world, all),
+    let sections = format!(
+        "{}<section id=\"plan\"><h2>Floor plan and elevation</h2>\n{}</section>\n\
+         <section id=\"properties\"><h2>Contents</h2>\n<div class=\"tables\">\n{}{}</div></section>\n",
+        stage::view_section("Surfaces and route", "route", "route"),
+        plan(world, DEFAULT_CUT_M).svg()?,
+        named_values("scene", &properties(world, all.len()).rows),
+        named_values("materials", &materials(world, &all).rows),
+    );
+    let page = html::Page {
+        kind: "scene",
+        title: world.name(),
+        without_scripts: "The three-dimensional view needs scripts; the floor plan below does not.",
+        sections,
+        data: encode::inert(&view(world, all).json().to_string()),
+        scripts: &scripts::VIEW,
+        ..html::Page::default()
     };
-    page.html()
+    Ok(page.html())
 }
 
 fn view(world: &World, triangles: Vec<(Triangle, MaterialId)>) -> View {
