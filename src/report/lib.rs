@@ -8,17 +8,12 @@ mod document;
 mod figures;
 mod integrity;
 mod metrics;
-mod names;
 pub mod page;
 pub mod plot;
-mod profile;
 mod quantity;
 mod rows;
 pub mod scene;
-mod sensors;
 mod table;
-mod verdict;
-mod wrap;
 
 pub use brief::brief;
 pub use comparison::{
@@ -31,12 +26,8 @@ pub use figures::{
 };
 pub use integrity::{CauseMetrics, EventMetrics, IntegrityMetrics};
 pub use metrics::{
-    ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, OpenLoopMetrics,
-    SimulationMetrics,
+    ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, NoiseMetrics,
+    OpenLoopMetrics, SensorMetrics, SimulationMetrics, noise_sources,
 };
-pub use names::{axis_label, quantity_name};
-pub use profile::timing_table;
-pub use quantity::{digits, length};
-pub use sensors::{NoiseMetrics, SensorMetrics, noise_sources};
-pub use table::{Table, summary, table};
-pub use wrap::wrapped;
+pub use quantity::{axis_label, digits, length, quantity_name};
+pub use table::{Table, summary, table, timing_table, wrapped};

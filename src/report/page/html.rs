@@ -1,6 +1,6 @@
 //! The parts of the page that are readable without scripts.
 
-use crate::{CauseMetrics, EventMetrics, Metrics, verdict};
+use crate::{CauseMetrics, EventMetrics, Metrics, rows};
 
 const SHELL: &str = include_str!("assets/page.html");
 const STYLE: &str = concat!(include_str!("assets/vendor/uplot.min.css"), include_str!("assets/style.css"));
@@ -98,7 +98,7 @@ pub(crate) fn with_code(text: &str) -> String {
 
 /// The verdict: icon, status and reason.
 pub(crate) fn verdict(metrics: &Metrics) -> String {
-    let (Some(verdict), Some(status)) = (verdict::verdict(metrics), metrics.status.as_deref()) else {
+    let (Some(verdict), Some(status)) = (rows::verdict(metrics), metrics.status.as_deref()) else {
         return String::new();
     };
     verdict_line(status, reason(&verdict, status))

@@ -1,12 +1,14 @@
 //! The parts of a document that need scripts.
 
 use super::data::{ChartGroup, ShownMode, SpringView};
+use super::encode::inert;
+use super::fields;
 use super::html::{self, escaped};
-use super::points::RunPoints;
 use super::scripts::{CHARTS, DATA, LIBRARIES, MODES, POINTS, READY, RUNS, TABLES};
 use super::stage::Stage;
-use super::{encode, table};
+use super::table;
 use crate::Table;
+use serde::Serialize;
 use serde_json::json;
 
 const SPRING: &str = include_str!("assets/spring.html");
@@ -51,7 +53,7 @@ impl Interactive {
                 html::Page {
                     kind: "gains",
                     without_scripts: "The charts need scripts. The folder plots/ has them as pictures.",
-                    data: encode::inert(&json!({ "charts": charts }).to_string()),
+                    data: inert(&json!({ "charts": charts }).to_string()),
                     scripts: &[LIBRARIES, DATA, CHARTS, TABLES, READY],
                     ..page
                 }
@@ -59,7 +61,7 @@ impl Interactive {
             Self::Spring(view) => html::Page {
                 kind: "spring",
                 without_scripts: "The three-dimensional view needs scripts; the tables do not.",
-                data: encode::inert(&json!(view).to_string()),
+                data: inert(&json!(view).to_string()),
                 scripts: &MODES,
                 ..page
             },
@@ -130,4 +132,38 @@ impl SpringView {
 fn capitalised(name: &str) -> String {
     let mut characters = name.chars();
     characters.next().map(|first| first.to_uppercase().chain(characters).collect()).unwrap_or_default()
+}
+
+/// The runs of a study as points: any two columns can be plotted against each other.
+///
+/// The rows are those of the table of the runs on the same page.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct RunPoints {
+    /// Numeric columns.
+    pub columns: Vec<PointColumn>,
+    /// Index of the column along the abscissa at first.
+    pub x: usize,
+    /// Index of the column along the ordinate at first.
+    pub y: usize,
+    /// Rows of the Pareto front, in any order.
+    pub front: Vec<usize>,
+    /// Folder of the study in commands if the page cannot find its own; `None` if runs cannot be repeated.
+    pub folder: Option<String>,
+}
+
+/// A numeric column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PointColumn {
+    /// Label, with the unit.
+    pub label: String,
+    /// One value per row; not finite if it is missing.
+    #[serde(serialize_with = "fields::numbers")]
+    pub values: Vec<f64>,
+}
+
+impl RunPoints {
+    /// The points as JSON that is inert within a `<script>` element.
+    pub(super) fn json(&self) -> String {
+        inert(&json!(self).to_string())
+    }
 }

@@ -11,11 +11,9 @@ pub(crate) mod html;
 pub(crate) mod interactive;
 pub mod links;
 mod live;
-mod points;
 mod quantise;
 pub(crate) mod scripts;
 pub(crate) mod stage;
-mod surfaces;
 pub(crate) mod table;
 mod update;
 
@@ -25,7 +23,7 @@ pub use data::{
     SpringView, TimelineRow, View,
 };
 pub use encode::TimedPose;
-pub use interactive::{AxisGains, Interactive, MAX_PAGE_RUNS};
+pub use interactive::{AxisGains, Interactive, MAX_PAGE_RUNS, PointColumn, RunPoints};
 pub use live::LivePage;
 pub use quantise::ViewPoint;
 use serde_json::json;
@@ -39,9 +37,8 @@ pub const MAX_PAGE_TRIANGLES: usize = 30_000;
 /// Maximum number of poses of a path on a page; one takes 32 bytes, 43 in base64.
 pub const MAX_PAGE_POSES: usize = 20_000;
 
-pub use points::{PointColumn, RunPoints};
-pub use surfaces::static_surfaces;
-pub(crate) use surfaces::{Triangle, area_m2, largest};
+pub use links::static_surfaces;
+pub(crate) use links::{Triangle, area_m2, largest};
 pub use update::{Increment, LiveEnd, LivePoint, LiveScan, LiveUpdate, LiveVerdict, TruePoses, Volume};
 
 const RUN_SECTIONS: &str = include_str!("assets/run.html");

@@ -3,7 +3,7 @@
 use super::encode::{TimedPose, path};
 use super::html;
 use super::quantise::{positions, times};
-use crate::{Metrics, verdict};
+use crate::{Metrics, rows};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
@@ -102,7 +102,7 @@ pub struct LiveVerdict {
 impl LiveVerdict {
     /// The final verdict of a run; `None` without an estimate.
     pub fn of(metrics: &Metrics) -> Option<Self> {
-        let (verdict, status) = (verdict::verdict(metrics)?, metrics.status.clone()?);
+        let (verdict, status) = (rows::verdict(metrics)?, metrics.status.clone()?);
         let reason = html::reason(&verdict, &status).to_owned();
         Some(Self { status, reason })
     }

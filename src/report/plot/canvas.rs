@@ -1,12 +1,61 @@
 //! Drawing primitives on an SVG or bitmap backend, in points from the top left corner.
+//!
+//! The font of all plots is bundled, so that plots do not depend on installed fonts.
 
 use super::palette::{INK, Rgb};
-use super::{PlotError, font};
 use plotters::coord::Shift;
 use plotters::prelude::{DrawingArea, DrawingBackend, IntoFont, PathElement, Polygon, RGBColor, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontTransform, IntoTextStyle, ShapeStyle};
+use plotters::style::{FontStyle, register_font};
 use zsim_base::printable::printable_name;
+
+/// Font sizes, points.
+pub(super) const TEXT: f64 = 12.0;
+pub(super) const SMALL_TEXT: f64 = 11.0;
+
+/// Room for labels in a font that is wider than the bundled one: a viewer shows an SVG with its own fonts.
+pub(super) const WIDER_FONT: f64 = 1.15;
+
+/// Family name of the font; an SVG contains it, and the viewer uses its own sans-serif font.
+const NAME: &str = "sans-serif";
+
+/// Font size in plotters divided by the em size, SVG backend: it divides the size by this constant.
+const SVG_SIZE_PER_EM: f64 = 1.24;
+
+/// Font size in plotters divided by the em size, bitmap backend: the size is ascent plus descent, for Roboto
+/// (1900 + 500) / 2048 em.
+const BITMAP_SIZE_PER_EM: f64 = 1.172;
+
+static ROBOTO: &[u8] = include_bytes!("fonts/Roboto-Regular.ttf");
+
+/// Registers the font with plotters; repeated calls have no effect.
+pub(super) fn register_fonts() -> Result<(), PlotError> {
+    register_font(NAME, FontStyle::Normal, ROBOTO)
+        .map_err(|_| PlotError::Drawing("the bundled font cannot be read".to_owned()))
+}
+
+/// Error of plotting or saving a plot.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// The drawing backend failed.
+    #[error("cannot draw the plot: {0}")]
+    Drawing(String),
+    /// The file cannot be written.
+    #[error("cannot write {path}: {source}")]
+    File {
+        /// Path of the file.
+        path: String,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+}
+
+impl PlotError {
+    pub(super) fn drawing(error: impl std::fmt::Display) -> Self {
+        Self::Drawing(error.to_string())
+    }
+}
 
 /// A position on the canvas, points, y downwards.
 pub(super) type CanvasPoint = (f64, f64);
@@ -68,6 +117,34 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
             }
             Pen::Pixels => units.windows(2).try_for_each(|ends| self.segment(ends[0], ends[1], colour, width)),
         }
+    }
+
+    /// Draws a dashed path; `width` is the line width, points.
+    pub(super) fn dashes(&self, path: &[CanvasPoint], colour: Rgb, width: f64) -> Result<(), PlotError> {
+        // Lengths, points.
+        const DASH: f64 = 5.0;
+        const GAP: f64 = 3.0;
+        let mut along = 0.0;
+        let mut dash = Vec::new();
+        for pair in path.windows(2) {
+            let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+            let length = (x1 - x0).hypot(y1 - y0);
+            let mut done = 0.0;
+            while done < length {
+                let phase = along % (DASH + GAP);
+                let drawing = phase < DASH;
+                let step = (if drawing { DASH } else { DASH + GAP } - phase).min(length - done).max(1e-6);
+                let at = |s: f64| (x0 + (x1 - x0) * s / length, y0 + (y1 - y0) * s / length);
+                if drawing {
+                    dash.extend([at(done), at(done + step)]);
+                } else if !dash.is_empty() {
+                    self.line(&std::mem::take(&mut dash), colour, width)?;
+                }
+                done += step;
+                along += step;
+            }
+        }
+        self.line(&dash, colour, width)
     }
 
     /// Draws all pixels within half the width of the segment from `a` to `b`; the round ends join the segments.
@@ -137,11 +214,11 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
             Anchor::Sideways => (HPos::Center, VPos::Center),
         };
         let (em, offset) = match self.pen {
-            Pen::Vector => (font::SVG_SIZE_PER_EM, 0.0),
-            Pen::Pixels => (font::BITMAP_SIZE_PER_EM, SVG_TEXT_OFFSET * size),
+            Pen::Vector => (SVG_SIZE_PER_EM, 0.0),
+            Pen::Pixels => (BITMAP_SIZE_PER_EM, SVG_TEXT_OFFSET * size),
         };
         let at = if anchor == Anchor::Sideways { (at.0 + offset, at.1) } else { (at.0, at.1 + offset) };
-        let upright = (font::NAME, size * em * self.scale).into_font();
+        let upright = (NAME, size * em * self.scale).into_font();
         let font = if anchor == Anchor::Sideways { upright.transform(FontTransform::Rotate270) } else { upright };
         let ink = rgb(INK);
         let style = font.into_text_style(self.area).color(&ink).pos(Pos::new(h, v));
@@ -151,7 +228,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
 
     /// The width of a text, points.
     pub(super) fn width_of(&self, text: &str, size: f64) -> Result<f64, PlotError> {
-        let font = (font::NAME, size * font::BITMAP_SIZE_PER_EM * self.scale).into_font();
+        let font = (NAME, size * BITMAP_SIZE_PER_EM * self.scale).into_font();
         let (width, _) = font.box_size(&printable_name(text)).map_err(|error| PlotError::Drawing(error.to_string()))?;
         Ok(f64::from(width) / self.scale)
     }

@@ -1,7 +1,7 @@
-use super::canvas::{Canvas, Pen};
+use super::canvas::{Canvas, Pen, PlotError, register_fonts};
 use super::merged_lines::merged_lines;
 use super::raster::Raster;
-use super::{Chart, PlotError, font, frame};
+use super::{Chart, frame};
 use plotters::prelude::{BitMapBackend, DrawingBackend, IntoDrawingArea, SVGBackend};
 use std::io::Write;
 use std::path::Path;
@@ -52,7 +52,7 @@ impl Figure {
     }
 
     fn draw<DB: DrawingBackend>(&self, backend: DB, scale: u32, pen: Pen) -> Result<(), PlotError> {
-        font::register()?;
+        register_fonts()?;
         let area = backend.into_drawing_area();
         let canvas = Canvas { area: &area, scale: f64::from(scale), pen };
         canvas.clear()?;

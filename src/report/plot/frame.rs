@@ -1,11 +1,9 @@
 //! Draws one chart: header, grid, labels and data.
 
 use super::axis::Axis;
-use super::canvas::{Anchor, Canvas, CanvasPoint};
-use super::font::{SMALL_TEXT, TEXT, WIDER_FONT};
+use super::canvas::{Anchor, Canvas, CanvasPoint, SMALL_TEXT, TEXT, WIDER_FONT};
 use super::legend::Header;
 use super::palette::{GRID, INK, shade, signed_shade};
-use super::stroke::dashes;
 use super::{Chart, Mark, PlotError, Series, SignedDots, Tick};
 use plotters::prelude::DrawingBackend;
 
@@ -207,7 +205,7 @@ fn points<DB: DrawingBackend>(canvas: &Canvas<DB>, frame: &Frame, series: &Serie
         Mark::Dots(size) => single.try_for_each(|at| canvas.dot(at, colour, size)),
         Mark::Crosses(size) => single.try_for_each(|at| canvas.cross(at, colour, size)),
         Mark::Line(width) => paths.try_for_each(|path| canvas.line(&path, colour, width)),
-        Mark::Dashes(width) => paths.try_for_each(|path| dashes(canvas, &path, series, width)),
+        Mark::Dashes(width) => paths.try_for_each(|path| canvas.dashes(&path, colour, width)),
     }
 }
 

@@ -1,9 +1,8 @@
 //! Header of a chart: title and legend above the axes.
 
-use super::canvas::{Anchor, Canvas, CanvasPoint};
-use super::font::{SMALL_TEXT, TEXT, WIDER_FONT};
+use super::canvas::{Anchor, Canvas, CanvasPoint, SMALL_TEXT, TEXT, WIDER_FONT};
 use super::palette::{INK, Rgb, shade, signed_shade};
-use super::{Chart, Mark, PlotError, Series, axis, stroke};
+use super::{Chart, Mark, PlotError, Series, axis};
 use plotters::prelude::DrawingBackend;
 
 /// Line spacing of the legend, points.
@@ -48,23 +47,15 @@ impl<'a> Header<'a> {
             entries.push(Entry { content: EntryContent::Series(series), width: wide });
         }
         if let Some(cells) = &chart.cells {
-            let beyond = |is_beyond: fn(f64, (f64, f64)) -> bool| {
-                cells.cells.iter().any(|cell| is_beyond(cell.value, cells.range))
-            };
             let (low, high) = cells.range;
-            let min =
-                if beyond(|value, (low, _)| value < low) { "\u{2264} " } else { "" }.to_owned() + &axis::short(low);
-            let max =
-                if beyond(|value, (_, high)| value > high) { "\u{2265} " } else { "" }.to_owned() + &axis::short(high);
-            entries.push(colour_bar(canvas, (min, max), &cells.unit, shade)?);
+            let below = if cells.cells.iter().any(|cell| cell.value < low) { "\u{2264} " } else { "" };
+            let above = if cells.cells.iter().any(|cell| cell.value > high) { "\u{2265} " } else { "" };
+            let ends = (below.to_owned() + &axis::short(low), above.to_owned() + &axis::short(high));
+            entries.push(colour_bar(canvas, ends, &cells.unit, shade)?);
         }
         if let Some(dots) = chart.signed_dots.as_ref().filter(|dots| !dots.unit.is_empty()) {
-            entries.push(colour_bar(
-                canvas,
-                (axis::short(-dots.limit), axis::short(dots.limit)),
-                &dots.unit,
-                signed_shade,
-            )?);
+            let ends = (axis::short(-dots.limit), axis::short(dots.limit));
+            entries.push(colour_bar(canvas, ends, &dots.unit, signed_shade)?);
         }
         let mut lines: Vec<Vec<Entry<'a>>> = Vec::new();
         for entry in entries {
@@ -146,12 +137,12 @@ impl Entry<'_> {
     fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<DB>, (x, y): CanvasPoint) -> Result<(), PlotError> {
         match &self.content {
             EntryContent::Series(series) => {
-                let sample = [(x, y), (x + SAMPLE_LENGTH, y)];
+                let (sample, colour) = ([(x, y), (x + SAMPLE_LENGTH, y)], series.colour.rgb());
                 match series.mark {
-                    Mark::Line(width) => canvas.line(&sample, series.colour.rgb(), width.max(1.5))?,
-                    Mark::Dashes(width) => stroke::dashes(canvas, &sample, series, width.max(1.5))?,
-                    Mark::Dots(_) => canvas.dot((x + SAMPLE_LENGTH / 2.0, y), series.colour.rgb(), 6.0)?,
-                    Mark::Crosses(_) => canvas.cross((x + SAMPLE_LENGTH / 2.0, y), series.colour.rgb(), 6.0)?,
+                    Mark::Line(width) => canvas.line(&sample, colour, width.max(1.5))?,
+                    Mark::Dashes(width) => canvas.dashes(&sample, colour, width.max(1.5))?,
+                    Mark::Dots(_) => canvas.dot((x + SAMPLE_LENGTH / 2.0, y), colour, 6.0)?,
+                    Mark::Crosses(_) => canvas.cross((x + SAMPLE_LENGTH / 2.0, y), colour, 6.0)?,
                 }
                 canvas.text(&series.name, (x + SAMPLE_LENGTH + NAME_GAP, y), Anchor::Left, SMALL_TEXT)
             }

@@ -7,17 +7,14 @@
 mod axis;
 mod canvas;
 mod chart;
-mod error;
 mod figure;
-mod font;
 mod frame;
 mod legend;
 mod merged_lines;
 mod palette;
 mod raster;
-mod stroke;
 
+pub use canvas::PlotError;
 pub use chart::{BandPoint, Cell, Cells, Chart, Mark, Series, SignedDot, SignedDots, Tick, robust_range};
-pub use error::PlotError;
 pub use figure::Figure;
 pub use palette::Colour;
