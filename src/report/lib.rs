@@ -29,5 +29,5 @@ pub use metrics::{
     ClockMetrics, ClosedLoopMetrics, CloudMetrics, FilterMetrics, LidarMetrics, LoopMetrics, Metrics, NoiseMetrics,
     OpenLoopMetrics, SensorMetrics, SimulationMetrics, noise_sources,
 };
-pub use quantity::{axis_label, digits, length, quantity_name};
+pub use quantity::{axis_label, capitalised, digits, length, quantity_name};
 pub use table::{Table, summary, table, timing_table, wrapped};

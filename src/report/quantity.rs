@@ -87,8 +87,12 @@ pub fn quantity_name(key: &str) -> String {
 
 /// [`quantity_name`] with a capital letter at the start, for the axis of a plot.
 pub fn axis_label(key: &str) -> String {
-    let name = quantity_name(key);
-    let mut characters = name.chars();
+    capitalised(&quantity_name(key))
+}
+
+/// A text with a capital letter at the start.
+pub fn capitalised(text: &str) -> String {
+    let mut characters = text.chars();
     characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
 

@@ -1,7 +1,7 @@
 //! The report on a spring, or another linkage, under a head as a document.
 
-use super::excited_mode::{ExcitedMode, along_axes};
 use super::mode_figure::{displayed_shape, ratio};
+use super::modes::{ExcitedMode, along_axes};
 use super::tables::{mode_table, properties, shake_table, stiffness_table};
 use super::{CoilReport, RestReport, Shake, SpringReport, mode_name};
 use crate::HeadError;
@@ -9,8 +9,8 @@ use zsim_base::geometry::{Pose, Vector};
 use zsim_dynamics::{GainPoints, HeadModel, HeadSpec, LinkageSpec, PartSpec};
 use zsim_elasticity::SpringDesign;
 use zsim_motion::Axis;
-use zsim_report::Document;
-use zsim_report::page::{Interactive, ShownMode, SpringView, links};
+use zsim_report::page::{Interactive, Link, ShownMode, SpringView, links};
+use zsim_report::{Document, capitalised};
 
 /// The report on a spring, or another linkage, under a head.
 ///
@@ -66,8 +66,7 @@ fn summary(report: &SpringReport) -> String {
         parts.push(format!("lowest frequency {:.3} Hz ({})", mode.frequency_hz, mode.name));
     }
     parts.extend(report.coil.as_ref().map(margin));
-    let mut text = parts.join("; ") + ".";
-    text.replace_range(..1, &text[..1].to_uppercase());
+    let mut text = capitalised(&parts.join("; ")) + ".";
     if let (Some(kg), Some(limit)) = (report.heaviest_head_kg, &report.heaviest_head_limit) {
         text += &format!(" The head has {:.3} kg; the maximum is {kg:.3} kg (above: {limit}).", report.head_mass_kg);
     }
@@ -136,7 +135,7 @@ fn centre_of_mass(parts: &[PartSpec]) -> Vector {
 fn note(pose: &str, spec: &HeadSpec) -> String {
     let mut text =
         format!("{pose} Axes of the base. Plates and blocks at the ends of springs and cords represent the base.");
-    if links::is_assumed(&spec.linkage) {
+    if links::of(&spec.linkage).iter().any(|link| matches!(link, Link::Spring(spring) if spring.is_assumed)) {
         text += " A spring is specified by its stiffness: its coils are assumed.";
     }
     let has_size = |part: &PartSpec| matches!(part, PartSpec::Block { .. });

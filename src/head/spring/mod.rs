@@ -2,19 +2,17 @@
 
 mod capacity;
 mod document;
-mod excited_mode;
 mod export;
 mod fatigue;
 mod margins;
 mod metrics;
 mod mode_figure;
-mod mode_name;
 mod model;
+mod modes;
 mod outline;
 mod report;
 mod shake;
 mod tables;
-mod view_plane;
 mod wire;
 
 pub use document::document;
@@ -23,7 +21,7 @@ pub use fatigue::{MISSION_HOURS, StressCycle};
 pub use margins::SpringMargins;
 pub use metrics::{DesignMetrics, closed_form, simulated};
 pub use mode_figure::mode_figure;
-pub use mode_name::mode_name;
+pub use modes::mode_name;
 pub use report::{CoilReport, ModeReport, RestReport, ShakeResponse, SpringReport, spring_report};
 pub use shake::Shake;
 pub use wire::{SpringMounting, Wire, WireLoad};

@@ -1,10 +1,11 @@
 //! Plot of the mode shapes.
 
-use super::outline::{Link, edges};
-use super::view_plane::{Polyline, ViewPlane};
+use super::outline::{Polyline, ViewPlane, edges, foot_line, outline};
 use zsim_base::geometry::{Pose, Rotation};
-use zsim_dynamics::{HeadModel, HeadSpec, Mode, ModeKind};
+use zsim_dynamics::{HeadModel, HeadSpec, Mode};
 use zsim_elasticity::{Vector6, split};
+use zsim_report::capitalised;
+use zsim_report::page::links;
 use zsim_report::plot::{Chart, Colour, Figure, Mark, Series};
 
 /// Displayed amplitude: rotation in rad, or translation in units of 0.1 m.
@@ -46,16 +47,6 @@ pub fn mode_figure(spec: &HeadSpec, head: &HeadModel) -> Figure {
     Figure::of(panels.collect()).in_columns(3)
 }
 
-/// Name of a kind of mode in the title.
-fn kind_name(kind: ModeKind) -> &'static str {
-    match kind {
-        ModeKind::Rocking => "Rocking",
-        ModeKind::Sway => "Sway",
-        ModeKind::Bounce => "Bounce",
-        ModeKind::Yaw => "Yaw",
-    }
-}
-
 /// Drawing of a mode in the view plane.
 struct ModeDrawing {
     title: String,
@@ -76,9 +67,9 @@ impl ModeDrawing {
         let rotation = Rotation::from_scaled_axis(turn);
         let moved = Pose::from_parts((centre + shift - rotation * centre).into(), rotation);
         let plane = ViewPlane::of(mode.kind, &shift, &turn);
-        let links = Link::all(&spec.linkage);
+        let links = links::of(&spec.linkage);
         let outline = |head: &Pose| {
-            let mut line: Polyline = links.iter().flat_map(|link| link.outline(head, &plane)).collect();
+            let mut line: Polyline = links.iter().flat_map(|link| outline(link, head, &plane)).collect();
             for part in &spec.parts {
                 line.push((f64::NAN, f64::NAN));
                 line.extend(edges(part, &plane).map(|corner| plane.project(&(head * corner).coords)));
@@ -88,7 +79,7 @@ impl ModeDrawing {
         Self {
             title: format!(
                 "{} {:.2} Hz, damping ratio {}",
-                kind_name(mode.kind),
+                capitalised(mode.kind.name()),
                 mode.frequency_hz,
                 ratio(mode.damping_ratio)
             ),
@@ -96,7 +87,7 @@ impl ModeDrawing {
             from_above: plane.from_above,
             rest: outline(&rest),
             moved: outline(&(moved * rest)),
-            base: links.iter().flat_map(|link| link.foot_line(&plane)).collect(),
+            base: links.iter().flat_map(|link| foot_line(link, &plane)).collect(),
         }
     }
 }

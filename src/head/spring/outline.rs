@@ -1,146 +1,75 @@
-//! Outlines of the linkage and the parts of a head, for the plot of the modes.
+//! Outlines of the linkage and the parts of a head, for the plot of the modes, and the plane of their view.
 
-use super::Wire;
-use super::view_plane::{Polyline, ViewPlane};
 use std::f64::consts::TAU;
 use zsim_base::geometry::{Pose, Vector};
-use zsim_dynamics::{ElementSpec, LinkageSpec, PartSpec};
-use zsim_elasticity::{SpringDesign, SpringSpec};
+use zsim_dynamics::{ModeKind, PartSpec};
+use zsim_report::page::{CoilLink, Link};
 
 /// Number of segments of the drawing of a spring.
 const POINTS: usize = 240;
 
-/// An element of a linkage to draw. Floats are omitted, because they are parts of the head.
-pub(super) enum Link {
-    /// A spring.
-    Spring(SpringOutline),
-    /// A straight line: a cord, or the link from a joint to the head.
-    Straight { foot: Vector, top_in_head: Vector },
+/// The outline of a link in the view plane, with the head at this pose in the base.
+pub(super) fn outline(link: &Link, head: &Pose, plane: &ViewPlane) -> Polyline {
+    let mut line = vec![(f64::NAN, f64::NAN)];
+    match link {
+        Link::Spring(spring) if plane.from_above => line.extend(top_circle(spring, head, plane)),
+        Link::Spring(spring) => line.extend(wire(spring, head, plane)),
+        Link::Straight { point_in_base, point_in_head } => {
+            let top = head * nalgebra::Point3::from(*point_in_head);
+            line.extend([plane.project(point_in_base), plane.project(&top.coords)]);
+        }
+    }
+    line
 }
 
-/// A spring to draw.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SpringOutline {
-    pub foot: Pose,
-    pub head_from_top: Pose,
-    /// Mean radius, m; 0 for a spring specified by stiffness, of which only the axis is drawn.
-    pub radius_m: f64,
-    /// Radius of the wire, m.
-    pub wire_radius_m: f64,
-    /// Number of coils, with those at the ends.
-    pub coils: f64,
+/// In side view, a line at the attachment of a link to the base, 1.5 times as wide as the spring.
+pub(super) fn foot_line(link: &Link, plane: &ViewPlane) -> Polyline {
+    if plane.from_above {
+        return Vec::new();
+    }
+    let (foot, half) = match link {
+        Link::Spring(spring) => (spring.base_from_foot, 1.5 * radius_m(spring).max(0.01)),
+        Link::Straight { point_in_base, .. } => (Pose::from_parts((*point_in_base).into(), Default::default()), 0.01),
+    };
+    let end = |x: f64| plane.project(&(foot * nalgebra::Point3::from(plane.right * x)).coords);
+    vec![(f64::NAN, f64::NAN), end(-half), end(half)]
 }
 
-impl Link {
-    /// All elements of a linkage to draw.
-    pub fn all(linkage: &LinkageSpec) -> Vec<Self> {
-        match linkage {
-            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => Vec::new(),
-            LinkageSpec::Spring { spring, base_from_spring, head_from_spring, .. } => {
-                vec![Self::Spring(SpringOutline::new(spring, base_from_spring.pose(), head_from_spring.pose()))]
-            }
-            LinkageSpec::Suspension { elements, .. } => elements.iter().filter_map(Self::of).collect(),
-        }
-    }
-
-    fn of(element: &ElementSpec) -> Option<Self> {
-        match element {
-            ElementSpec::Spring(mounted) => {
-                let (foot, top) = (mounted.base_from_spring.pose(), mounted.head_from_spring.pose());
-                Some(Self::Spring(SpringOutline::new(&mounted.spring, foot, top)))
-            }
-            ElementSpec::Cord(cord) => {
-                Some(Self::Straight { foot: cord.base_point_m.into(), top_in_head: cord.head_point_m.into() })
-            }
-            ElementSpec::UniversalJoint(joint) => {
-                let foot = joint.base_from_joint.pose().translation.vector;
-                Some(Self::Straight { foot, top_in_head: Vector::zeros() })
-            }
-            ElementSpec::Float(_) => None,
-        }
-    }
-
-    /// The spring, if it is one.
-    pub fn spring(self) -> Option<SpringOutline> {
-        if let Self::Spring(spring) = self { Some(spring) } else { None }
-    }
-
-    /// The outline in the view plane, with the head at this pose in the base.
-    pub fn outline(&self, head: &Pose, plane: &ViewPlane) -> Polyline {
-        let mut line = vec![(f64::NAN, f64::NAN)];
-        match self {
-            Self::Spring(spring) if plane.from_above => line.extend(spring.top_circle(head, plane)),
-            Self::Spring(spring) => line.extend(spring.wire(head, plane)),
-            Self::Straight { foot, top_in_head } => {
-                let top = head * nalgebra::Point3::from(*top_in_head);
-                line.extend([plane.project(foot), plane.project(&top.coords)]);
-            }
-        }
-        line
-    }
-
-    /// In side view, a line at the attachment to the base, 1.5 times as wide as the spring.
-    pub fn foot_line(&self, plane: &ViewPlane) -> Polyline {
-        if plane.from_above {
-            return Vec::new();
-        }
-        let (foot, half) = match self {
-            Self::Spring(spring) => (spring.foot, 1.5 * spring.radius_m.max(0.01)),
-            Self::Straight { foot, .. } => (Pose::from_parts((*foot).into(), Default::default()), 0.01),
-        };
-        let end = |x: f64| plane.project(&(foot * nalgebra::Point3::from(plane.right * x)).coords);
-        vec![(f64::NAN, f64::NAN), end(-half), end(half)]
-    }
+/// Mean radius of a spring, m; 0 for one specified by its stiffness, of which only the axis is drawn.
+fn radius_m(spring: &CoilLink) -> f64 {
+    if spring.is_assumed { 0.0 } else { spring.coil_radius_m }
 }
 
-impl SpringOutline {
-    fn new(spring: &SpringSpec, foot: Pose, head_from_top: Pose) -> Self {
-        // The spec is valid at this point, so errors cannot occur.
-        let wire = Wire::of(spring).ok().flatten();
-        let coil = match spring.design() {
-            Ok(SpringDesign::Coil(coil)) => Some(coil),
-            _ => None,
-        };
-        let axis_only = Self { foot, head_from_top, radius_m: 0.0, wire_radius_m: 0.0, coils: 0.0 };
-        wire.zip(coil).map_or(axis_only, |(wire, coil)| Self {
-            radius_m: wire.coil_radius_m,
-            wire_radius_m: 0.5 * wire.diameter_m,
-            coils: coil.solid_length_m() / wire.diameter_m,
-            ..axis_only
-        })
-    }
+/// The circle of the spring at its top end.
+fn top_circle(spring: &CoilLink, head: &Pose, plane: &ViewPlane) -> Polyline {
+    let top = head * spring.head_from_top;
+    let point = |k: usize| {
+        let (sin, cos) = (k as f64 / POINTS as f64 * TAU).sin_cos();
+        plane.project(&(top * nalgebra::Point3::new(cos * radius_m(spring), sin * radius_m(spring), 0.0)).coords)
+    };
+    (0..=POINTS).map(point).collect()
+}
 
-    /// The circle of the spring at its top end.
-    fn top_circle(&self, head: &Pose, plane: &ViewPlane) -> Polyline {
-        let top = head * self.head_from_top;
-        let point = |k: usize| {
-            let (sin, cos) = (k as f64 / POINTS as f64 * TAU).sin_cos();
-            plane.project(&(top * nalgebra::Point3::new(cos * self.radius_m, sin * self.radius_m, 0.0)).coords)
-        };
-        (0..=POINTS).map(point).collect()
-    }
-
-    /// The wire in side view, around a cubic Hermite curve from the foot to the top, tangential to the end axes.
-    fn wire(&self, head: &Pose, plane: &ViewPlane) -> Polyline {
-        let top = head * self.head_from_top;
-        let (p, q) = (self.foot.translation.vector, top.translation.vector);
-        let length = (q - p).norm();
-        let (foot_tangent, top_tangent) =
-            (self.foot.rotation * Vector::z() * length, top.rotation * Vector::z() * length);
-        let axis = |u: f64| {
-            let centre = p * ((1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u)) + q * (u * u * (3.0 - 2.0 * u));
-            plane.project(&(centre + foot_tangent * (u * (1.0 - u) * (1.0 - u)) + top_tangent * (u * u * (u - 1.0))))
-        };
-        let point = |k: usize| {
-            let u = k as f64 / POINTS as f64;
-            let (x, y) = axis(u);
-            let ((x0, y0), (x1, y1)) = (axis((u - 1e-3).max(0.0)), axis((u + 1e-3).min(1.0)));
-            let step = (x1 - x0).hypot(y1 - y0).max(f64::MIN_POSITIVE);
-            let out = self.radius_m * 1e3 * (u * self.coils * TAU).sin() / step;
-            (x + out * (y1 - y0), y - out * (x1 - x0))
-        };
-        (0..=POINTS).map(point).collect()
-    }
+/// The wire in side view, around a cubic Hermite curve from the foot to the top, tangential to the end axes.
+fn wire(spring: &CoilLink, head: &Pose, plane: &ViewPlane) -> Polyline {
+    let top = head * spring.head_from_top;
+    let (p, q) = (spring.base_from_foot.translation.vector, top.translation.vector);
+    let length = (q - p).norm();
+    let (foot_tangent, top_tangent) =
+        (spring.base_from_foot.rotation * Vector::z() * length, top.rotation * Vector::z() * length);
+    let axis = |u: f64| {
+        let centre = p * ((1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u)) + q * (u * u * (3.0 - 2.0 * u));
+        plane.project(&(centre + foot_tangent * (u * (1.0 - u) * (1.0 - u)) + top_tangent * (u * u * (u - 1.0))))
+    };
+    let point = |k: usize| {
+        let u = k as f64 / POINTS as f64;
+        let (x, y) = axis(u);
+        let ((x0, y0), (x1, y1)) = (axis((u - 1e-3).max(0.0)), axis((u + 1e-3).min(1.0)));
+        let step = (x1 - x0).hypot(y1 - y0).max(f64::MIN_POSITIVE);
+        let out = radius_m(spring) * 1e3 * (u * spring.coils * TAU).sin() / step;
+        (x + out * (y1 - y0), y - out * (x1 - x0))
+    };
+    (0..=POINTS).map(point).collect()
 }
 
 /// The corners of the closed outline of a part in the view plane, in the head frame.
@@ -154,4 +83,47 @@ pub(super) fn edges(part: &PartSpec, plane: &ViewPlane) -> impl Iterator<Item = 
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]
         .into_iter()
         .map(move |(x, y)| nalgebra::Point3::from(centre + right * (x * wide) + up * (y * high)))
+}
+
+/// A polyline in the view plane, mm; NaN interrupts it.
+pub(super) type Polyline = Vec<(f64, f64)>;
+
+/// View plane of a drawing, in the base frame.
+pub(super) struct ViewPlane {
+    pub right: Vector,
+    pub up: Vector,
+    pub from_above: bool,
+}
+
+impl ViewPlane {
+    /// The plane of a mode: perpendicular to its rotation axis, or along its translation if it hardly rotates.
+    ///
+    /// Yaw is viewed from above.
+    pub fn of(kind: ModeKind, shift: &Vector, turn: &Vector) -> Self {
+        let from_above = kind == ModeKind::Yaw;
+        let level = if turn.xy().norm() > 10.0 * shift.xy().norm() {
+            Vector::new(turn.y, -turn.x, 0.0)
+        } else {
+            Vector::new(shift.x, shift.y, 0.0)
+        };
+        let is_bending = matches!(kind, ModeKind::Rocking | ModeKind::Sway) && level.norm() > 1e-9;
+        let right = if is_bending { level.normalize() } else { Vector::x() };
+        // Orient the plane along the closer positive axis.
+        let right = if right[right.iamax()] < 0.0 { -right } else { right };
+        Self { right, up: if from_above { Vector::y() } else { Vector::z() }, from_above }
+    }
+
+    /// Projects a point, m, to the plane, mm.
+    pub fn project(&self, point: &Vector) -> (f64, f64) {
+        (self.right.dot(point) * 1e3, self.up.dot(point) * 1e3)
+    }
+
+    pub fn labels(&self) -> (String, String) {
+        let across = match (self.right.x, self.right.y) {
+            (x, _) if x > 0.999 => "x (mm)".to_owned(),
+            (_, y) if y > 0.999 => "y (mm)".to_owned(),
+            (x, y) => format!("Along {:.0}\u{b0} from x (mm)", y.atan2(x).to_degrees()),
+        };
+        (across, if self.from_above { "y (mm)" } else { "z (mm)" }.to_owned())
+    }
 }

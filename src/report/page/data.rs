@@ -81,22 +81,7 @@ pub struct Block {
 #[serde(untagged)]
 pub enum Link {
     /// A helical spring.
-    Spring {
-        /// Pose of the foot in the base; z points along the spring.
-        #[serde(rename = "foot", serialize_with = "fields::pose")]
-        base_from_foot: Pose,
-        /// Pose of the top in the head.
-        #[serde(rename = "top", serialize_with = "fields::pose")]
-        head_from_top: Pose,
-        /// Mean radius of the coil, m.
-        #[serde(rename = "radius")]
-        coil_radius_m: f64,
-        /// Diameter of the wire, m.
-        #[serde(rename = "wire")]
-        wire_diameter_m: f64,
-        /// Number of coils.
-        coils: f64,
-    },
+    Spring(CoilLink),
     /// A straight line: a rope, a cable, or the link from a joint to the head.
     Straight {
         /// Attachment point in the base, m.
@@ -106,6 +91,28 @@ pub enum Link {
         #[serde(rename = "to")]
         point_in_head: Vector,
     },
+}
+
+/// A helical spring between base and head.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CoilLink {
+    /// Pose of the foot in the base; z points along the spring.
+    #[serde(rename = "foot", serialize_with = "fields::pose")]
+    pub base_from_foot: Pose,
+    /// Pose of the top in the head.
+    #[serde(rename = "top", serialize_with = "fields::pose")]
+    pub head_from_top: Pose,
+    /// Mean radius of the coil, m.
+    #[serde(rename = "radius")]
+    pub coil_radius_m: f64,
+    /// Diameter of the wire, m.
+    #[serde(rename = "wire")]
+    pub wire_diameter_m: f64,
+    /// Number of active coils.
+    pub coils: f64,
+    /// Whether the spring is specified by its stiffness, so that its coils are assumed.
+    #[serde(skip)]
+    pub is_assumed: bool,
 }
 
 /// Head and linkage to scale, with the modes.

@@ -7,7 +7,7 @@ use super::html::{self, escaped};
 use super::scripts::{CHARTS, DATA, LIBRARIES, MODES, POINTS, READY, RUNS, TABLES};
 use super::stage::Stage;
 use super::table;
-use crate::Table;
+use crate::{Table, capitalised};
 use serde::Serialize;
 use serde_json::json;
 
@@ -127,11 +127,6 @@ impl SpringView {
         let values = [("view_title", title), ("player", &player), ("controls", &controls), ("note", &note)];
         stage.fill(SPRING, &values)
     }
-}
-
-fn capitalised(name: &str) -> String {
-    let mut characters = name.chars();
-    characters.next().map(|first| first.to_uppercase().chain(characters).collect()).unwrap_or_default()
 }
 
 /// The runs of a study as points: any two columns can be plotted against each other.

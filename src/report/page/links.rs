@@ -1,19 +1,13 @@
 //! Parts, springs and cords of a head, and triangles of a scene, as the view draws them.
 
-use super::{Block, Link, MAX_PAGE_TRIANGLES};
+use super::{Block, CoilLink, Link, MAX_PAGE_TRIANGLES};
 use zsim_base::geometry::Vector;
 use zsim_dynamics::{ElementSpec, LinkageSpec, PartSpec, PlacementSpec};
 use zsim_elasticity::SpringSpec;
 use zsim_world::{MaterialId, World};
 
-/// Dimensions with which a spring is drawn if only its stiffness is known.
-struct DrawnCoil {
-    radius_m: f64,
-    wire_diameter_m: f64,
-    coils: f64,
-}
-
-const ASSUMED_COIL: DrawnCoil = DrawnCoil { radius_m: 0.0125, wire_diameter_m: 0.002, coils: 10.0 };
+/// Radius, wire diameter (m) and number of the coils with which a spring is drawn if only its stiffness is known.
+const ASSUMED_COIL: (f64, f64, f64) = (0.0125, 0.002, 10.0);
 
 /// The elements between base and head; empty for a rigid or actuated mount.
 pub fn of(linkage: &LinkageSpec) -> Vec<Link> {
@@ -37,18 +31,6 @@ pub fn blocks(parts: &[PartSpec]) -> Vec<Block> {
     parts.iter().filter_map(block).collect()
 }
 
-/// Whether a spring of the linkage is specified by stiffness only, and therefore drawn with assumed dimensions.
-pub fn is_assumed(linkage: &LinkageSpec) -> bool {
-    let by_stiffness = |spec: &SpringSpec| matches!(spec.resolved(), Ok(SpringSpec::Stiffness { .. }));
-    match linkage {
-        LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => false,
-        LinkageSpec::Spring { spring, .. } => by_stiffness(spring),
-        LinkageSpec::Suspension { elements, .. } => {
-            elements.iter().any(|element| matches!(element, ElementSpec::Spring(one) if by_stiffness(&one.spring)))
-        }
-    }
-}
-
 fn element(element: &ElementSpec) -> Option<Link> {
     match element {
         ElementSpec::Spring(element) => {
@@ -67,21 +49,15 @@ fn element(element: &ElementSpec) -> Option<Link> {
 }
 
 fn spring(spec: &SpringSpec, base_from_foot: &PlacementSpec, head_from_top: &PlacementSpec) -> Link {
-    let drawn = match spec.resolved() {
-        Ok(SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, .. }) => DrawnCoil {
-            radius_m: 0.5e-3 * coil_diameter_mm,
-            wire_diameter_m: 1e-3 * wire_diameter_mm,
-            coils: active_coils,
-        },
-        _ => ASSUMED_COIL,
+    let (drawn, is_assumed) = match spec.resolved() {
+        Ok(SpringSpec::Coil { coil_diameter_mm, wire_diameter_mm, active_coils, .. }) => {
+            ((0.5e-3 * coil_diameter_mm, 1e-3 * wire_diameter_mm, active_coils), false)
+        }
+        _ => (ASSUMED_COIL, true),
     };
-    Link::Spring {
-        base_from_foot: base_from_foot.pose(),
-        head_from_top: head_from_top.pose(),
-        coil_radius_m: drawn.radius_m,
-        wire_diameter_m: drawn.wire_diameter_m,
-        coils: drawn.coils,
-    }
+    let (coil_radius_m, wire_diameter_m, coils) = drawn;
+    let (base_from_foot, head_from_top) = (base_from_foot.pose(), head_from_top.pose());
+    Link::Spring(CoilLink { base_from_foot, head_from_top, coil_radius_m, wire_diameter_m, coils, is_assumed })
 }
 
 /// Corners of a triangle, in the world.

@@ -19,8 +19,8 @@ mod update;
 
 use crate::rows;
 pub use data::{
-    Abscissa, Block, Chart, ChartGroup, Curve, CurveStyle, Interval, Link, Ordinate, RunPage, Section, ShownMode,
-    SpringView, TimelineRow, View,
+    Abscissa, Block, Chart, ChartGroup, CoilLink, Curve, CurveStyle, Interval, Link, Ordinate, RunPage, Section,
+    ShownMode, SpringView, TimelineRow, View,
 };
 pub use encode::TimedPose;
 pub use interactive::{AxisGains, Interactive, MAX_PAGE_RUNS, PointColumn, RunPoints};

@@ -1,9 +1,9 @@
 //! The wire of the springs of a head at rest as a triangle mesh.
 
-use crate::spring::outline::SpringOutline;
 use nalgebra::Point3;
 use std::f64::consts::TAU;
 use zsim_base::geometry::{Pose, Vector};
+use zsim_report::page::CoilLink;
 
 /// Sections of the wire per coil, and corners of a section: the faces are within 1 % of the radii of coil and wire.
 const SECTIONS_PER_COIL: usize = 36;
@@ -13,8 +13,8 @@ const CORNERS: usize = 24;
 pub(super) type Surface = Vec<[Vector; 3]>;
 
 /// The surface of a spring's wire, with the head at rest at `base_from_head`; `None` for a spring given by a stiffness.
-pub(super) fn wire_surface(spring: &SpringOutline, base_from_head: &Pose) -> Option<Surface> {
-    if spring.radius_m <= 0.0 || spring.coils <= 0.0 {
+pub(super) fn wire_surface(spring: &CoilLink, base_from_head: &Pose) -> Option<Surface> {
+    if spring.is_assumed || spring.coils <= 0.0 {
         return None;
     }
     let sections = (spring.coils * SECTIONS_PER_COIL as f64).ceil() as usize;
@@ -24,7 +24,7 @@ pub(super) fn wire_surface(spring: &SpringOutline, base_from_head: &Pose) -> Opt
         .map(|k| {
             let (before, after) = (k.saturating_sub(1), (k + 1).min(sections));
             let along = (middles[after] - middles[before]).normalize();
-            ring(&middles[k], &along, &spring.foot, spring.wire_radius_m)
+            ring(&middles[k], &along, &spring.base_from_foot, 0.5 * spring.wire_diameter_m)
         })
         .collect();
     let mut faces = Vec::new();
@@ -44,18 +44,18 @@ pub(super) fn wire_surface(spring: &SpringOutline, base_from_head: &Pose) -> Opt
 }
 
 /// The middle of the wire at a fraction `u` of its turns, on a helix around a cubic Hermite curve from foot to top.
-fn middle(spring: &SpringOutline, base_from_head: &Pose, u: f64) -> Vector {
+fn middle(spring: &CoilLink, base_from_head: &Pose, u: f64) -> Vector {
     let top = base_from_head * spring.head_from_top;
-    let (p, q) = (spring.foot.translation.vector, top.translation.vector);
+    let (p, q) = (spring.base_from_foot.translation.vector, top.translation.vector);
     let length = (q - p).norm();
-    let tangents = [spring.foot, top].map(|end| end.rotation * Vector::z() * length);
+    let tangents = [spring.base_from_foot, top].map(|end| end.rotation * Vector::z() * length);
     let axis = p * ((1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u))
         + q * (u * u * (3.0 - 2.0 * u))
         + tangents[0] * (u * (1.0 - u) * (1.0 - u))
         + tangents[1] * (u * u * (u - 1.0));
-    let rotation = spring.foot.rotation.slerp(&top.rotation, u);
+    let rotation = spring.base_from_foot.rotation.slerp(&top.rotation, u);
     let (sin, cos) = (u * spring.coils * TAU).sin_cos();
-    axis + rotation * (Point3::new(cos, sin, 0.0).coords * spring.radius_m)
+    axis + rotation * (Point3::new(cos, sin, 0.0).coords * spring.coil_radius_m)
 }
 
 /// The corners of a section of the wire, counterclockwise around `along`.
@@ -73,17 +73,18 @@ fn ring(middle: &Vector, along: &Vector, foot: &Pose, wire_radius_m: f64) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spring::{HeadExport, outline::Link};
+    use crate::spring::HeadExport;
     use approx::assert_relative_eq;
     use std::collections::BTreeMap;
     use std::f64::consts::PI;
     use zsim_dynamics::{HeadModel, load};
+    use zsim_report::page::{Link, links};
 
     /// The only spring of the handheld head, and the pose of the head at rest.
-    fn handheld() -> (SpringOutline, Pose) {
+    fn handheld() -> (CoilLink, Pose) {
         let (spec, source) = load("handheld").unwrap();
         let head = HeadModel::new(&spec, &source).unwrap();
-        match &Link::all(&spec.linkage)[..] {
+        match &links::of(&spec.linkage)[..] {
             [Link::Spring(spring)] => (*spring, *head.base_from_head_at_rest()),
             _ => panic!("the handheld head has one spring"),
         }
@@ -105,8 +106,8 @@ mod tests {
         assert!(edges.values().all(|count| *count == 0));
         // Divergence theorem; and Pappus: the area of the section times the length of the middle line.
         let volume: f64 = surface.iter().map(|[a, b, c]| a.dot(&b.cross(c)) / 6.0).sum();
-        let length_m = spring.coils * TAU * spring.radius_m;
-        let section = PI * spring.wire_radius_m.powi(2);
+        let length_m = spring.coils * TAU * spring.coil_radius_m;
+        let section = PI * (0.5 * spring.wire_diameter_m).powi(2);
         // The climb of the helix lengthens the wire, the corners make section and coil smaller.
         assert_relative_eq!(volume, section * length_m, max_relative = 0.03);
         // It reaches from the foot to the top, around the axis.
@@ -114,8 +115,8 @@ mod tests {
         let heights: Vec<f64> = surface.iter().flatten().map(|v| v.z).collect();
         let (low, high) =
             (heights.iter().copied().fold(f64::INFINITY, f64::min), heights.iter().copied().fold(0.0, f64::max));
-        assert_relative_eq!(low, spring.foot.translation.z - spring.wire_radius_m, epsilon = 1e-3);
-        assert_relative_eq!(high, top.translation.z + spring.wire_radius_m, epsilon = 1e-3);
+        assert_relative_eq!(low, spring.base_from_foot.translation.z - 0.5 * spring.wire_diameter_m, epsilon = 1e-3);
+        assert_relative_eq!(high, top.translation.z + 0.5 * spring.wire_diameter_m, epsilon = 1e-3);
     }
 
     #[test]

@@ -9,10 +9,10 @@ mod mjcf;
 mod sdf;
 mod urdf;
 
-use super::outline::{Link, SpringOutline};
 use joints::{ElasticJoint, RestModel};
 use zsim_base::geometry::{Pose, Vector};
 use zsim_dynamics::{Body, CarrierSpec, HeadModel, HeadSpec, LinearModel, PartSpec, natural_frequencies_hz};
+use zsim_report::page::{Link, links};
 use zsim_world::stl;
 
 /// Greatest relative error of the model's natural frequencies.
@@ -53,7 +53,7 @@ pub struct HeadExport {
     /// Size and centre in the head frame of its blocks, m.
     blocks: Vec<([f64; 3], [f64; 3])>,
     carrier: Vec<CarrierSpec>,
-    springs: Vec<SpringOutline>,
+    links: Vec<Link>,
 }
 
 impl HeadExport {
@@ -90,7 +90,7 @@ impl HeadExport {
             joints,
             blocks: spec.parts.iter().filter_map(block).collect(),
             carrier: spec.carrier.clone(),
-            springs: Link::all(&spec.linkage).into_iter().filter_map(Link::spring).collect(),
+            links: links::of(&spec.linkage),
         })
     }
 
@@ -99,7 +99,10 @@ impl HeadExport {
     /// # Errors
     /// When the mesh is too large for the format.
     pub fn spring_mesh(&self) -> std::io::Result<Option<Vec<u8>>> {
-        let surfaces = self.springs.iter().filter_map(|spring| mesh::wire_surface(spring, &self.base_from_head));
+        let surfaces = self.links.iter().filter_map(|link| match link {
+            Link::Spring(spring) => mesh::wire_surface(spring, &self.base_from_head),
+            Link::Straight { .. } => None,
+        });
         let surface: mesh::Surface = surfaces.flatten().collect();
         if surface.is_empty() { Ok(None) } else { stl(surface.iter()).map(Some) }
     }
