@@ -3,16 +3,14 @@
 //! Directions are in the heading frame: vertical z axis, rotated with the base's yaw, so that turning the base does not
 //! increase the coverage.
 
-mod document;
 mod figure;
 mod result;
 mod sphere;
 mod track;
 
-pub(crate) use document::main_values;
-pub use document::{density_csv, document, over_time_csv};
 pub use figure::coverage_figure;
-pub use result::{Coverage, CoverageCell, CoveragePlan, Density, GyroUsage};
+pub(crate) use result::main_values;
+pub use result::{Coverage, CoverageCell, CoveragePlan, Density, GyroUsage, density_csv, document, over_time_csv};
 
 use crate::HeadError;
 use sphere::Sphere;
@@ -77,9 +75,9 @@ pub fn coverage(
     Ok(Coverage {
         fraction_seen: sphere.observed_fraction(),
         fraction_in_1s: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
-        fraction_in_a_sweep: sweeps.mean(|s| s.fraction),
+        fraction_in_a_sweep: sweeps.mean(|(fraction, _)| *fraction),
         sweep_s: (turning.len() > 1).then(|| (turning[turning.len() - 1] - turning[0]) / (turning.len() - 1) as f64),
-        density_in_a_sweep_per_sr: sweeps.mean(|s| s.density_per_sr),
+        density_in_a_sweep_per_sr: sweeps.mean(|(_, density_per_sr)| *density_per_sr),
         density_per_sr_s: sphere.density_per_sr(observed_s),
         half_covered_s: time_to(0.5),
         covered_s: time_to(0.9),
@@ -95,29 +93,23 @@ pub fn coverage(
 /// Coverage of single sweeps.
 #[derive(Debug, Default)]
 struct Sweeps {
-    complete: Vec<Sweep>,
+    /// Observed fraction of the sphere, and beams per steradian.
+    complete: Vec<(f64, f64)>,
     /// Whether the first turning point has passed.
     has_started: bool,
-}
-
-/// Coverage of one sweep.
-#[derive(Debug, Clone, Copy)]
-struct Sweep {
-    fraction: f64,
-    density_per_sr: f64,
 }
 
 impl Sweeps {
     /// Ends a sweep at a turning point; the time before the first one is not a sweep.
     fn end(&mut self, sphere: &mut Sphere) {
-        let (fraction, density_per_sr) = sphere.end_sweep();
+        let sweep = sphere.end_sweep();
         if std::mem::replace(&mut self.has_started, true) {
-            self.complete.push(Sweep { fraction, density_per_sr });
+            self.complete.push(sweep);
         }
     }
 
     /// Mean of a value over the complete sweeps.
-    fn mean(&self, value: fn(&Sweep) -> f64) -> Option<f64> {
+    fn mean(&self, value: fn(&(f64, f64)) -> f64) -> Option<f64> {
         (!self.complete.is_empty()).then(|| self.complete.iter().map(value).sum::<f64>() / self.complete.len() as f64)
     }
 }

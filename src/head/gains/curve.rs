@@ -1,12 +1,9 @@
 //! Settings and result of a gain measurement.
 
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use zsim_base::random::Seed;
-use zsim_dynamics::AccelerationKind;
-use zsim_dynamics::CoilContact;
-use zsim_dynamics::GainPoints;
-use zsim_dynamics::Peak;
+use zsim_dynamics::{AccelerationKind, CoilContact, GainPoints, Peak};
 use zsim_motion::Axis;
 
 /// Settings of a gain measurement.
@@ -111,17 +108,46 @@ pub(super) const SIGMAS_95: f64 = 1.96;
 /// Minimum coherence of a plotted gain: below it noise and nonlinearity dominate.
 pub(super) const MIN_COHERENCE: f64 = 0.5;
 
+/// Phases of the closed form without jumps by a turn, and the measured ones on the turn that is the nearest to them, rad.
+pub(super) fn continuous_phases(points: &[GainPoint]) -> Vec<(f64, f64)> {
+    let mut model_rad = 0.0;
+    let phases = points.iter().map(|p| {
+        model_rad += wrapped(p.phase_model_rad - model_rad);
+        (model_rad, model_rad + wrapped(p.phase_rad - model_rad))
+    });
+    phases.collect()
+}
+
+/// The angle between -pi and pi that differs by whole turns.
+pub(super) fn wrapped(angle_rad: f64) -> f64 {
+    angle_rad - TAU * (angle_rad / TAU).round()
+}
+
 /// Key of an axis in files, whose words are in [`quantity_name`](zsim_report::quantity_name): `x_rot` for the angular rate about x, `x` for the acceleration along x.
 pub fn axis_name(axis: Axis) -> &'static str {
-    match axis {
-        Axis::X => "x",
-        Axis::Y => "y",
-        Axis::Z => "z",
-        Axis::Roll => "x_rot",
-        Axis::Pitch => "y_rot",
-        Axis::Yaw => "z_rot",
-    }
+    ["x", "y", "z", "x_rot", "y_rot", "z_rot"][axis as usize]
 }
 
 /// All axes in the order of the paper's figure, rotations first.
 pub const AXES: [Axis; 6] = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::X, Axis::Y, Axis::Z];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn continuous_phases_have_no_jump_and_are_the_same_angles() {
+        // A delay: the phase falls by 0.4 rad per line, through two turns.
+        let true_rad: Vec<f64> = (0..40).map(|k| -0.4 * f64::from(k)).collect();
+        let point = |phase_rad: &f64| {
+            let (phase_model_rad, phase_rad) = (wrapped(*phase_rad), phase_rad + TAU);
+            let (freq_hz, gain, coherence, gain_sigma, gain_model) = (1.0, 1.0, 1.0, 0.0, 1.0);
+            GainPoint { freq_hz, gain, coherence, gain_sigma, gain_model, phase_rad, phase_model_rad }
+        };
+        let found = continuous_phases(&true_rad.iter().map(point).collect::<Vec<_>>());
+        assert!(
+            found.iter().zip(&true_rad).all(|((a, b), c)| (a - c).abs() < 1e-9 && (b - c).abs() < 1e-9),
+            "{found:?}"
+        );
+    }
+}

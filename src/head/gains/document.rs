@@ -1,15 +1,14 @@
 //! The result of a gain measurement as a document.
 
 use super::bode::LOWEST_SHARE;
-use super::curve::{MIN_COHERENCE, SIGMAS_95};
+use super::curve::{MIN_COHERENCE, SIGMAS_95, continuous_phases, wrapped};
 use super::table::{name_of, peak_table, swing_table};
 use super::{GainCurve, GainPoint, SwingStudy, axis_name, swing_figure};
-use std::f64::consts::TAU;
 use zsim_dynamics::HeadModel;
 use zsim_motion::Axis;
 use zsim_report::page::{Abscissa, AxisGains, Chart, ChartGroup, Curve, CurveStyle, Interactive, Ordinate, Section};
 use zsim_report::plot::PlotError;
-use zsim_report::{Content, Document, Plot, Table};
+use zsim_report::{Content, Document, Plot, Table, capitalised};
 
 /// Maximum number of frequencies of a chart; more are thinned, and the largest gain of each interval is kept.
 const MAX_LINES: usize = 2_000;
@@ -82,25 +81,18 @@ fn modes(head: &HeadModel) -> Table {
 }
 
 /// Quantity and direction of an axis.
-fn axis_title(axis: Axis) -> &'static str {
-    match axis {
-        Axis::X => "acceleration along x",
-        Axis::Y => "acceleration along y",
-        Axis::Z => "acceleration along z",
-        Axis::Roll => "angular rate about x",
-        Axis::Pitch => "angular rate about y",
-        Axis::Yaw => "angular rate about z",
-    }
+fn axis_title(axis: Axis) -> String {
+    let quantity = if axis.is_rotation() { "angular rate about" } else { "acceleration along" };
+    format!("{quantity} {}", ["x", "y", "z"][axis as usize % 3])
 }
 
 fn axis_gains(curve: &GainCurve) -> AxisGains {
     let points = with_model_peak(&thinned(&curve.points), curve);
-    let title = axis_title(curve.axis);
     let axis = axis_name(curve.axis);
     let groups = [vec![gain_chart(&points)], vec![phase_chart(&points), coherence_chart(&points)]];
     AxisGains {
         axis,
-        title: title[..1].to_uppercase() + &title[1..],
+        title: capitalised(&axis_title(curve.axis)),
         groups: groups.map(|charts| ChartGroup { section: Section::Axis(axis), charts }).into(),
     }
 }
@@ -125,26 +117,13 @@ fn with_model_peak(points: &[GainPoint], curve: &GainCurve) -> Vec<GainPoint> {
     if let [before, next] = &points[after.saturating_sub(1)..points.len().min(after + 1)] {
         let share = (peak.freq_hz - before.freq_hz) / (next.freq_hz - before.freq_hz);
         let turn = wrapped(next.phase_model_rad - before.phase_model_rad);
-        let none = f64::NAN;
-        all.insert(
-            after,
-            GainPoint {
-                freq_hz: peak.freq_hz,
-                gain_model: peak.gain,
-                phase_model_rad: before.phase_model_rad + share * turn,
-                gain: none,
-                gain_sigma: none,
-                coherence: none,
-                phase_rad: none,
-            },
-        );
+        let (freq_hz, gain_model) = (peak.freq_hz, peak.gain);
+        let phase_model_rad = before.phase_model_rad + share * turn;
+        let [gain, gain_sigma, coherence, phase_rad] = [f64::NAN; 4];
+        let at_peak = GainPoint { freq_hz, gain, coherence, gain_sigma, gain_model, phase_rad, phase_model_rad };
+        all.insert(after, at_peak);
     }
     all
-}
-
-/// The angle between -pi and pi that differs by whole turns.
-fn wrapped(angle_rad: f64) -> f64 {
-    angle_rad - TAU * (angle_rad / TAU).round()
 }
 
 fn chart(title: &str, label: &str, ordinate: Ordinate, points: &[GainPoint], curves: Vec<Curve>) -> Chart {
@@ -181,16 +160,11 @@ fn gain_chart(points: &[GainPoint]) -> Chart {
 
 /// The phase without jumps: that of the closed form is continuous, and the measured one is within half a turn of it.
 fn phase_chart(points: &[GainPoint]) -> Chart {
-    let mut model = Vec::with_capacity(points.len());
-    for p in points {
-        let before = model.last().copied().unwrap_or(0.0);
-        model.push(before + wrapped(p.phase_model_rad - before));
-    }
-    let simulated = points.iter().zip(&model).map(|(p, model)| measured(p, model + wrapped(p.phase_rad - model)));
-    let degrees = |values: Vec<f64>| values.into_iter().map(f64::to_degrees).collect();
-    let (simulated, model) = (degrees(simulated.collect()), degrees(model));
+    let phases = continuous_phases(points);
+    let model = phases.iter().map(|(model_rad, _)| model_rad.to_degrees()).collect();
+    let simulated = points.iter().zip(&phases).map(|(p, (_, phase_rad))| measured(p, *phase_rad).to_degrees());
     let curves = vec![
-        Curve { name: "simulated".to_owned(), style: CurveStyle::Measured, values: simulated },
+        Curve { name: "simulated".to_owned(), style: CurveStyle::Measured, values: simulated.collect() },
         Curve { name: "closed form".to_owned(), style: CurveStyle::Model, values: model },
     ];
     chart("Phase", "Phase (\u{b0})", Ordinate::Degrees, points, curves)
@@ -204,6 +178,7 @@ fn coherence_chart(points: &[GainPoint]) -> Chart {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     /// A resonance at 1 Hz with a damping ratio of 2 %, whose phase falls from 0 to -180 degrees.
     fn resonance(freq_hz: f64) -> GainPoint {

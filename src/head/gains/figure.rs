@@ -17,27 +17,32 @@ pub(super) const PANELS: [(&str, &str, &[Axis]); 3] = [
 pub fn gain_panels(curves: &[GainCurve]) -> Vec<Chart> {
     let panels = PANELS.iter().map(|(title, label, axes)| {
         let shown = curves.iter().filter(|curve| axes.contains(&curve.axis));
-        shown.fold(Chart::new(title, "Frequency (Hz)", label).starting_at_zero(), |chart, curve| {
-            let (name, colour) = style(curve.axis);
-            let size = dot_size(colour);
-            // The peak may be between two spectral lines.
-            let peak = curve.peak_model.map(|peak| (peak.freq_hz, peak.gain));
-            let mut model: Vec<_> = curve.points.iter().map(|p| (p.freq_hz, p.gain_model)).chain(peak).collect();
-            model.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let measured = |p: &&GainPoint| p.coherence >= MIN_COHERENCE;
-            let dots = curve.points.iter().filter(measured).map(|p| (p.freq_hz, p.gain)).collect();
-            let ends = |p: &GainPoint| BandPoint {
-                x: p.freq_hz,
-                low: (p.gain - SIGMAS_95 * p.gain_sigma).max(0.0),
-                high: p.gain + SIGMAS_95 * p.gain_sigma,
-            };
-            let band = curve.points.iter().filter(measured).map(ends).collect();
-            chart
-                .with(Series::line("", colour, model).marked(Mark::Line(1.0)))
-                .with(Series::dots(name, colour, dots).marked(Mark::Dots(size)).with_band(band))
-        })
+        let chart = Chart::new(title, "Frequency (Hz)", label).starting_at_zero();
+        shown.fold(chart, |chart, curve| with_curve(chart, curve, 0.0, |x| x))
     });
     panels.collect()
+}
+
+/// Adds a curve to a chart whose axes have the scale `scaled`; the lower edge of the band is at least `lowest` of the gain.
+pub(super) fn with_curve(chart: Chart, curve: &GainCurve, lowest: f64, scaled: fn(f64) -> f64) -> Chart {
+    let (name, colour) = style(curve.axis);
+    let point = |(freq_hz, gain): (f64, f64)| Some((scaled(freq_hz), scaled(gain))).filter(|(_, y)| y.is_finite());
+    // The peak may be between two spectral lines.
+    let peak = curve.peak_model.map(|peak| (peak.freq_hz, peak.gain));
+    let lines = curve.points.iter().map(|p| (p.freq_hz, p.gain_model)).chain(peak);
+    let mut model: Vec<_> = lines.filter_map(point).collect();
+    model.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let measured = || curve.points.iter().filter(|p| p.coherence >= MIN_COHERENCE && scaled(p.gain).is_finite());
+    let dots = measured().map(|p| (scaled(p.freq_hz), scaled(p.gain))).collect();
+    let ends = |p: &GainPoint| BandPoint {
+        x: scaled(p.freq_hz),
+        low: scaled((p.gain - SIGMAS_95 * p.gain_sigma).max(lowest * p.gain)),
+        high: scaled(p.gain + SIGMAS_95 * p.gain_sigma),
+    };
+    let dots = Series::dots(name, colour, dots).marked(Mark::Dots(dot_size(colour)));
+    chart
+        .with(Series::line("", colour, model).marked(Mark::Line(1.0)))
+        .with(dots.with_band(measured().map(ends).collect()))
 }
 
 /// Coherence in the same charts as [`gain_panels`].
@@ -89,12 +94,6 @@ pub(super) fn dot_size(colour: Colour) -> f64 {
 
 /// Name and colour of an axis's curve.
 pub(super) fn style(axis: Axis) -> (&'static str, Colour) {
-    match axis {
-        Axis::X => ("x", Colour::Estimate),
-        Axis::Y => ("y", Colour::Second),
-        Axis::Z => ("z", Colour::Third),
-        Axis::Roll => ("about x", Colour::Estimate),
-        Axis::Pitch => ("about y", Colour::Second),
-        Axis::Yaw => ("about z", Colour::Third),
-    }
+    let name = ["x", "y", "z", "about x", "about y", "about z"][axis as usize];
+    (name, [Colour::Estimate, Colour::Second, Colour::Third][axis as usize % 3])
 }

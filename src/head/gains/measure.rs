@@ -43,17 +43,7 @@ impl GainWatch<'static> {
 /// # Errors
 /// If the plan is invalid, if the simulation fails, or if the measurement is stopped.
 pub fn gain_curves(head: &HeadModel, plan: &GainPlan, watch: GainWatch<'_>) -> Result<Vec<GainCurve>, HeadError> {
-    let schedule = checked_schedule(head, plan)?;
-    let tasks: Vec<_> = AXES.iter().flat_map(|axis| (0..plan.realisations).map(|k| (*axis, k))).collect();
-    let pieces = PieceProgress::new(tasks.len(), watch.on_progress);
-    let records = tasks.par_iter().map(|(axis, k)| {
-        let record = record(head, *axis, *k, plan, schedule, watch.stop);
-        pieces.finish_one();
-        record
-    });
-    let records = records.collect::<Result<Vec<_>, _>>()?;
-    let of_axes = AXES.iter().zip(records.chunks(plan.realisations));
-    of_axes.map(|(axis, records)| curve(head, *axis, records, plan, schedule)).collect()
+    curves(head, &AXES, plan, watch)
 }
 
 /// Measures the gain of `head` along or about `axis`, as [`gain_curves`].
@@ -61,14 +51,22 @@ pub fn gain_curves(head: &HeadModel, plan: &GainPlan, watch: GainWatch<'_>) -> R
 /// # Errors
 /// As [`gain_curves`].
 pub fn gain_curve(head: &HeadModel, axis: Axis, plan: &GainPlan, watch: GainWatch<'_>) -> Result<GainCurve, HeadError> {
+    Ok(curves(head, &[axis], plan, watch)?.remove(0))
+}
+
+/// Measures the gains along or about each of `axes`.
+fn curves(head: &HeadModel, axes: &[Axis], plan: &GainPlan, watch: GainWatch<'_>) -> Result<Vec<GainCurve>, HeadError> {
     let schedule = checked_schedule(head, plan)?;
-    let pieces = PieceProgress::new(plan.realisations, watch.on_progress);
-    let records = (0..plan.realisations).into_par_iter().map(|k| {
-        let record = record(head, axis, k, plan, schedule, watch.stop);
+    let tasks: Vec<_> = axes.iter().flat_map(|axis| (0..plan.realisations).map(|k| (*axis, k))).collect();
+    let pieces = PieceProgress::new(tasks.len(), watch.on_progress);
+    let records = tasks.par_iter().map(|(axis, k)| {
+        let record = record(head, *axis, *k, plan, schedule, watch.stop);
         pieces.finish_one();
         record
     });
-    curve(head, axis, &records.collect::<Result<Vec<_>, _>>()?, plan, schedule)
+    let records = records.collect::<Result<Vec<_>, _>>()?;
+    let of_axes = axes.iter().zip(records.chunks(plan.realisations));
+    of_axes.map(|(axis, records)| curve(head, *axis, records, plan, schedule)).collect()
 }
 
 /// Checks the plan and computes the schedule.

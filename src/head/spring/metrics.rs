@@ -1,12 +1,11 @@
 //! Metrics of a spring design, from the linearised head or from a simulation.
 
-use super::Shake;
 use super::margins::{LoadRecord, SpringMargins};
 use super::model::SpringModel;
 use crate::HeadError;
 use crate::coverage::{Coverage, CoveragePlan, coverage};
 use nalgebra::Complex;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use zsim_base::geometry::{Kinematics, Pose, Rotation, Vector};
 use zsim_base::random::Seed;
@@ -67,13 +66,8 @@ pub fn closed_form(
     let phases = (0..12).map(|k| f64::from(k) * TAU / 12.0);
     let mut loads = LoadRecord::of_linear_swing(&model, &head);
     phases.for_each(|phase| loads.add(&swing.state(phase), &[]));
-    let swing = SwingResult {
-        field_of_view_deg: 2.0 * pitch.to_degrees(),
-        rate_deg_per_s: (swing.omega * pitch).to_degrees(),
-        cycles: mission_cycles(mission_hours, frequency_hz),
-        loads: &loads,
-    };
-    Ok(metrics(&model, &head, &swing))
+    let motion_deg = (2.0 * pitch.to_degrees(), (swing.omega * pitch).to_degrees());
+    Ok(metrics(&model, &head, &loads, motion_deg, mission_hours * 3600.0 * frequency_hz))
 }
 
 /// Computes the metrics by a full simulation of the shake, with the coverage of `lidar`; the mission as in [`closed_form`].
@@ -109,13 +103,8 @@ pub fn simulated(
             loads.add(state, &gaps.of_each(&base_from_head));
         }
     })?;
-    let swing = SwingResult {
-        field_of_view_deg: coverage.field_of_view_deg,
-        rate_deg_per_s: coverage.gyro.most_deg_per_s,
-        cycles: mission_cycles(mission_hours, frequency_hz),
-        loads: &loads,
-    };
-    Ok((metrics(&model, &head, &swing), coverage))
+    let motion_deg = (coverage.field_of_view_deg, coverage.gyro.most_deg_per_s);
+    Ok((metrics(&model, &head, &loads, motion_deg, mission_hours * 3600.0 * frequency_hz), coverage))
 }
 
 /// Motion of a base that is shaken about the foot of the spring.
@@ -130,33 +119,26 @@ impl BaseMotion for ShakeAboutFoot<'_> {
     }
 }
 
-/// Response to the shake, linear or simulated.
-struct SwingResult<'a> {
-    field_of_view_deg: f64,
-    rate_deg_per_s: f64,
-    /// Number of cycles in the mission.
+/// The metrics of a head with this field of view and maximum rate, whose `loads` are repeated `cycles` times in the mission.
+fn metrics(
+    model: &SpringModel,
+    head: &HeadModel,
+    loads: &LoadRecord,
+    (field_of_view_deg, rate_deg_per_s): (f64, f64),
     cycles: f64,
-    loads: &'a LoadRecord<'a>,
-}
-
-fn mission_cycles(hours: f64, frequency_hz: f64) -> f64 {
-    hours * 3600.0 * frequency_hz
-}
-
-/// The metrics of the head with the response `swing`.
-fn metrics(model: &SpringModel, head: &HeadModel, swing: &SwingResult<'_>) -> DesignMetrics {
+) -> DesignMetrics {
     let response = head.frequency_response(&head.default_points());
     let peak = response.peak(Axis::Pitch, MAX_PEAK_HZ, AccelerationKind::Kinematic);
-    let margins = swing.loads.margins();
+    let margins = loads.margins();
     DesignMetrics {
         rocking_hz: head.linear_modes().first().map_or(f64::INFINITY, |mode| mode.frequency_hz),
         peak_gain: peak.map_or(1.0, |peak| peak.gain),
         sag_mm: model.sag_m(head).map(|sag_m| sag_m * 1e3),
         spring_mass_g: model.mass_kg.map(|mass_kg| mass_kg * 1e3),
-        field_of_view_deg: swing.field_of_view_deg,
-        rate_deg_per_s: swing.rate_deg_per_s,
+        field_of_view_deg,
+        rate_deg_per_s,
         stress_share: margins.yielding.map(|margin| 1.0 / margin),
-        fatigue_margin: swing.loads.fatigue_margin(swing.cycles),
+        fatigue_margin: loads.fatigue_margin(cycles),
         margins,
     }
 }
@@ -199,5 +181,48 @@ impl LinearSwing<'_> {
         let origin = self.foot - base_rotation * self.foot;
         let base = Kinematics::at_rest(Pose::from_parts(origin.into(), base_rotation));
         HeadState { t_s: 0.0, head, base }
+    }
+}
+
+/// A sinusoidal pitch motion of the base about the foot of the spring, as by a hand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Shake {
+    /// Amplitude of the base's pitch, degrees.
+    #[serde(with = "zsim_base::spec::checked::Positive")]
+    pub pitch_deg: f64,
+    /// Frequency, Hz; default: that of the slowest mode of the head.
+    pub frequency_hz: Option<f64>,
+}
+
+impl Shake {
+    /// Checks the frequency, which a spec can leave out.
+    ///
+    /// # Errors
+    /// A message if it is not a finite number above 0.
+    pub fn check(&self) -> Result<(), String> {
+        match self.frequency_hz {
+            Some(hz) if !(hz.is_finite() && hz > 0.0) => {
+                Err(format!("frequency_hz: expected a finite number above 0, found {hz}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Amplitude of the base's pitch, rad.
+    pub(super) fn base_rad(&self) -> f64 {
+        self.pitch_deg.to_radians()
+    }
+
+    /// The frequency, Hz; 1 Hz for a head without modes.
+    pub(super) fn frequency_of(&self, head: &HeadModel) -> f64 {
+        self.frequency_hz.unwrap_or(head.linear_modes().first().map_or(1.0, |mode| mode.frequency_hz))
+    }
+}
+
+impl Default for Shake {
+    /// 2 degrees at the slowest mode.
+    fn default() -> Self {
+        Self { pitch_deg: 2.0, frequency_hz: None }
     }
 }

@@ -1,6 +1,5 @@
 //! Design of the spring under a head: metrics of a given spring, and the search for one that meets goals.
 
-mod capacity;
 mod document;
 mod export;
 mod fatigue;
@@ -11,7 +10,6 @@ mod model;
 mod modes;
 mod outline;
 mod report;
-mod shake;
 mod tables;
 mod wire;
 
@@ -19,9 +17,8 @@ pub use document::document;
 pub use export::{ExportError, HeadExport};
 pub use fatigue::{MISSION_HOURS, StressCycle};
 pub use margins::SpringMargins;
-pub use metrics::{DesignMetrics, closed_form, simulated};
+pub use metrics::{DesignMetrics, Shake, closed_form, simulated};
 pub use mode_figure::mode_figure;
 pub use modes::mode_name;
 pub use report::{CoilReport, ModeReport, RestReport, ShakeResponse, SpringReport, spring_report};
-pub use shake::Shake;
 pub use wire::{SpringMounting, Wire, WireLoad};

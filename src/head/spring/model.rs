@@ -24,7 +24,9 @@ impl WoundSpring {
     }
 }
 
-/// Properties of the spring of a head, or of the springs of a suspension.
+/// Properties of the spring of a head, or of the springs of a suspension; by default without wire and mounting, for a head
+/// without a rest pose or a spring.
+#[derive(Default)]
 pub(super) struct SpringModel {
     /// The springs of a suspension, in the order of the spec.
     pub suspension: Vec<WoundSpring>,
@@ -46,7 +48,7 @@ impl SpringModel {
         let (spring, cable) = match &spec.linkage {
             LinkageSpec::Spring { spring, cable, .. } => (spring, cable),
             LinkageSpec::Suspension { elements, .. } => return Self::of_suspension(elements),
-            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => return Ok(Self::without_mounting()),
+            LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } => return Ok(Self::default()),
         };
         let WoundSpring { wire, coil } = WoundSpring::of(spring)?;
         Ok(Self {
@@ -71,21 +73,8 @@ impl SpringModel {
         Ok(Self {
             suspension: springs.into_iter().map(WoundSpring::of).collect::<Result<_, _>>()?,
             mass_kg: masses.filter(|masses| !masses.is_empty()).map(|masses| masses.iter().sum()),
-            ..Self::without_mounting()
+            ..Self::default()
         })
-    }
-
-    /// A model without wire and mounting, for a head without a rest pose or a spring.
-    pub fn without_mounting() -> Self {
-        Self {
-            suspension: Vec::new(),
-            wire: None,
-            mounting: None,
-            has_no_cable: false,
-            coil: None,
-            end_m: 0.0,
-            mass_kg: None,
-        }
     }
 
     /// Whether the load on the spring follows from the motion of the head.

@@ -1,16 +1,16 @@
 //! Report on a spring under a head: rest pose, stiffness, modes, limits and response to a shake.
 
-use super::capacity::heaviest_head;
 use super::model::{SpringModel, at_rest};
 use super::{DesignMetrics, MISSION_HOURS, Shake, closed_form, mode_name, simulated};
 use crate::HeadError;
 use crate::coverage::{Coverage, CoveragePlan};
 use crate::gains::{AXES, axis_name};
 use serde::Serialize;
-use zsim_base::geometry::{STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
+use zsim_base::geometry::{Kinematics, Pose, STANDARD_GRAVITY_M_PER_S2, gravity_in_world, roll_pitch_yaw};
 use zsim_base::spec::Source;
 use zsim_dynamics::{
-    AccelerationKind, ElementLoad, HeadModel, HeadSpec, LinkageSpec, MassLimit, Mode, ModeKind, Peak, stands_with_mass,
+    AccelerationKind, Body, ElementLoad, HeadModel, HeadSpec, HeadState, LinkageSpec, MassLimit, Mode, ModeKind, Peak,
+    max_head_mass, stands_with_mass,
 };
 use zsim_elasticity::{Coil, EndsSpec, Material, Matrix6, Spring, SpringDesign, SpringSpec, buckling_load_n};
 use zsim_sensors::Lidar;
@@ -19,7 +19,7 @@ use zsim_sensors::Lidar;
 const GUIDED_SEGMENTS: usize = 16;
 
 /// Report on a spring under a head.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SpringReport {
     /// Mass of the head, kg.
     pub head_mass_kg: f64,
@@ -199,27 +199,21 @@ fn unstable_report(spec: &HeadSpec, heaviest: Option<MassLimit>, because: String
                 wire: super::Wire::of(spring)?,
                 end_m: spring.end_length_m()?,
                 mass_kg: spring.wire_mass_kg().map_err(zsim_dynamics::DynamicsError::from)?,
-                ..SpringModel::without_mounting()
+                ..SpringModel::default()
             };
             (model, -(base_from_spring.pose().rotation.inverse() * weight).z)
         }
         LinkageSpec::Rigid { .. } | LinkageSpec::Actuated { .. } | LinkageSpec::Suspension { .. } => {
-            (SpringModel::without_mounting(), weight.norm())
+            (SpringModel::default(), weight.norm())
         }
     };
     Ok(SpringReport {
         head_mass_kg,
-        stands: false,
         falls_because: Some(because),
         heaviest_head_kg: heaviest.as_ref().map(|limit| limit.mass_kg),
         heaviest_head_limit: heaviest.map(|limit| limit.reason),
-        bearings: Vec::new(),
         coil: coil_of(spec)?.map(|coil| coil_report(&coil, &model, load_n, None)),
-        rest: None,
-        stiffness: None,
-        modes: Vec::new(),
-        gain_peaks: Vec::new(),
-        shaken: None,
+        ..SpringReport::default()
     })
 }
 
@@ -240,27 +234,25 @@ fn shake_response(
 }
 
 /// The coil of a head on a single spring, with its ends and material.
-struct OrderedCoil {
-    coil: Coil,
-    ends: EndsSpec,
-    material: Material,
-}
+type OrderedCoil = (Coil, EndsSpec, Material);
 
 fn coil_of(spec: &HeadSpec) -> Result<Option<OrderedCoil>, HeadError> {
     let LinkageSpec::Spring { spring, .. } = &spec.linkage else { return Ok(None) };
     let resolved = spring.resolved()?;
     let design = resolved.design().map_err(zsim_dynamics::DynamicsError::from)?;
     Ok(match (design, resolved) {
-        (SpringDesign::Coil(coil), SpringSpec::Coil { ends, material, .. }) => {
-            Some(OrderedCoil { coil, ends, material })
-        }
+        (SpringDesign::Coil(coil), SpringSpec::Coil { ends, material, .. }) => Some((coil, ends, material)),
         _ => None,
     })
 }
 
 /// The report on a coil under the compressive load `load_n`.
-fn coil_report(ordered: &OrderedCoil, model: &SpringModel, load_n: f64, stress_pa: Option<f64>) -> CoilReport {
-    let OrderedCoil { coil, ends, material } = ordered;
+fn coil_report(
+    (coil, ends, material): &OrderedCoil,
+    model: &SpringModel,
+    load_n: f64,
+    stress_pa: Option<f64>,
+) -> CoilReport {
     let length_m = coil.free_length_m() - load_n / coil.axial_n_per_m();
     let open_m = length_m - coil.solid_length_m();
     let (radius_m, wire_m) = model.wire.map_or((f64::NAN, f64::NAN), |w| (w.coil_radius_m, w.diameter_m));
@@ -317,6 +309,25 @@ fn mode_report(mode: &Mode) -> ModeReport {
 
 fn rows(matrix: &Matrix6) -> [[f64; 6]; 6] {
     std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
+}
+
+/// The maximum mass of a head with the shape of `spec` that has a stable rest pose, with a stress at rest below the yield
+/// stress of the wire.
+///
+/// `None` if no mass makes the head fall and the strength of the wire is not known.
+///
+/// # Errors
+/// When the parts of the head or a spring are invalid.
+fn heaviest_head(spec: &HeadSpec, source: &Source) -> Result<Option<MassLimit>, HeadError> {
+    let too_much = |body: &Body, rest: &Pose| {
+        let model = SpringModel::of(spec, body).ok()?;
+        let at_rest =
+            HeadState { t_s: 0.0, head: Kinematics::at_rest(*rest), base: Kinematics::at_rest(Pose::identity()) };
+        let yield_pa = model.wire?.yield_pa()?;
+        let stress_pa = model.stress_pa(&at_rest)?;
+        (stress_pa > yield_pa).then(|| "the wire yields".to_owned())
+    };
+    Ok(max_head_mass(spec, source, &too_much)?)
 }
 
 #[cfg(test)]
