@@ -1,7 +1,6 @@
 //! The beams of a recording: one pass over them, and their projection by an estimate or by the truth.
 
 use super::RunError;
-use super::read_ahead::{MeasurementStream, QUEUE_CAPACITY, read_ahead};
 use super::truth_cursor::TruthCursor;
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
@@ -10,7 +9,7 @@ use zsim_base::geometry::{Pose, SmoothCursor, Trajectory, Vector};
 use zsim_base::measurement::{Calibration, ImuSample, LidarCorrection, LidarReturn, LidarScan, Measurement};
 use zsim_base::parallel::Stopped;
 use zsim_base::time::{Span, Stamp};
-use zsim_recording::{Reader, Selection};
+use zsim_recording::{Loss, Reader, RecordingError, Selection};
 
 /// Returns between poses farther apart than this, s, are not projected: the estimate has a pose every 10 ms, except in gaps.
 const MAX_POSE_GAP_S: f64 = 0.1;
@@ -144,4 +143,36 @@ impl LidarModel {
         let scale = 1.0 + self.range_m / point_in_laser.norm();
         ProjectedBeam { point: frame_from_laser.rotation * point_in_laser * scale + origin, origin }
     }
+}
+
+/// Capacity of the queue, measurements: about 1 s of data.
+pub(super) const QUEUE_CAPACITY: usize = 256;
+
+/// The measurements of a recording, in order.
+pub(super) type MeasurementStream<'a> = dyn Iterator<Item = Result<Measurement, RecordingError>> + 'a;
+
+/// Calls `process` with the measurements, and returns its result and the losses of the reader.
+///
+/// The measurements are read ahead if more than one thread is available.
+pub(super) fn read_ahead<T>(
+    reader: &Reader,
+    selection: &Selection,
+    process: impl FnOnce(&mut MeasurementStream) -> T,
+) -> (T, Loss) {
+    let mut measurements = reader.measurements(selection);
+    if rayon::current_num_threads() < 2 {
+        let result = process(&mut measurements);
+        return (result, measurements.loss().clone());
+    }
+    thread::scope(|scope| {
+        let (sender, receiver) = sync_channel(QUEUE_CAPACITY);
+        let reading = scope.spawn(move || {
+            // `process` can stop before the end of the recording.
+            let _ = measurements.by_ref().all(|measurement| sender.send(measurement).is_ok());
+            measurements.loss().clone()
+        });
+        let result = process(&mut receiver.into_iter());
+        let loss = reading.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (result, loss)
+    })
 }

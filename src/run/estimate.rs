@@ -16,7 +16,7 @@ use super::page::RunResults;
 use super::recorded_manifest::RecordedManifest;
 use super::register::{CloudRegistration, RegisteredCloud};
 use super::result_files::{estimate_files, remove};
-use super::{CalibrationSpec, ProgressMonitor, RunError, Stage, artefacts, comparison, memory};
+use super::{CalibrationSpec, ProgressMonitor, RunError, Stage, artefacts, comparison, resources};
 use std::path::Path;
 use zsim_estimation::{EstimatorSpec, Timing};
 use zsim_evaluation::MapKnowledge;
@@ -256,7 +256,7 @@ fn described(
         cloud: registered
             .map(|registered| cloud_metrics(registered, world_from_map.as_ref(), origin.surroundings))
             .unwrap_or_default(),
-        peak_rss_mib: memory::peak_rss_mib(),
+        peak_rss_mib: resources::peak_rss_mib(),
         ..estimate
     }
 }

@@ -2,8 +2,7 @@
 
 use super::cloud::{Origin, Surroundings};
 use super::estimate::estimate_in;
-use super::result_files::{full_run_files, remove};
-use super::viewer_files::ViewerFiles;
+use super::result_files::{ViewerFiles, full_run_files, remove};
 use super::{EstimateOptions, EstimateResult, Manifest, ProgressMonitor, RunError, record};
 use std::path::Path;
 use zsim_recording::{Reader, TopicPreference};

@@ -1,8 +1,8 @@
 //! Open-loop estimation from a recording, as it would run online.
 
+use super::beams::{MeasurementStream, read_ahead};
 use super::cadence::Cadence;
 use super::map_options::MapOptions;
-use super::read_ahead::{MeasurementStream, read_ahead};
 use super::{ProgressMonitor, RunError, Stage, StageData};
 use std::collections::BTreeMap;
 use std::fs::File;

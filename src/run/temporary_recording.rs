@@ -1,10 +1,9 @@
 //! Runs that share a simulation and its recording in a temporary file.
 
 use super::bound::information_bound;
-use super::clock_curve::ClockCurve;
 use super::record::{description, record_together};
 use super::reference_system::{ReferenceMap, compare_clouds};
-use super::results::{Needs, Results, Swing};
+use super::results::{ClockCurve, Needs, Results, Swing};
 use super::run_recording::RunRecording;
 use super::sampled_truth::SampledTruth;
 use super::timing::{MapErrors, Reference, TimingRun, TimingSpec};

@@ -1,7 +1,7 @@
 //! The charts of the page.
 
 use super::RunResults;
-use super::paths::TurnRates;
+use super::view::TurnRates;
 use crate::integrity::{Integrity, alignment_s};
 use zsim_base::geometry::Vector;
 use zsim_base::time::Stamp;

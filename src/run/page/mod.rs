@@ -1,10 +1,9 @@
 //! Gathers the data of the page of a run.
 
 mod charts;
-mod cloud;
-mod paths;
 mod run_results;
 mod timeline;
+mod view;
 
 use super::sampled_truth::SampledTruth;
 pub(super) use run_results::RunResults;
@@ -29,15 +28,15 @@ impl RunResults<'_> {
 
     fn view(&self) -> View {
         let of_truth = |poses: fn(&SampledTruth) -> &[(Stamp, Pose)]| {
-            self.loops.truth.as_ref().map(|truth| paths::truth(self, poses(truth))).unwrap_or_default()
+            self.loops.truth.as_ref().map(|truth| view::truth(self, poses(truth))).unwrap_or_default()
         };
         let world = self.world();
         let (surfaces, surfaces_are_partial) = world.map(static_surfaces).unwrap_or_default();
         let head = self.origin.manifest.run.as_ref().map(|run| &run.head.spec);
         View {
-            points: cloud::points(self),
+            points: view::points(self),
             materials: world.map_or(&[][..], World::materials).iter().map(|material| material.name.clone()).collect(),
-            estimate: paths::estimate(self),
+            estimate: view::estimate(self),
             truth: of_truth(|truth| &truth.heads),
             base: of_truth(|truth| &truth.bases),
             surfaces,

@@ -1,3 +1,21 @@
+//! Memory and disk space of this machine.
+
+use std::path::Path;
+
+/// Free space for this user on the file system of `folder`, bytes; `None` if the system does not report it.
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    #[cfg(target_os = "linux")]
+    {
+        let space = rustix::fs::statvfs(folder).ok()?;
+        space.f_bavail.checked_mul(space.f_frsize)
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = folder;
+        None
+    }
+}
+
 /// Peak resident memory of this process, MiB; `None` on systems other than Linux.
 pub(super) fn peak_rss_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
