@@ -2,7 +2,8 @@
 
 use super::quantity;
 use super::usage::Usage;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use zsim_base::geometry::{Pose, Rotation, Vector};
@@ -142,8 +143,8 @@ pub(super) struct EstimatorArguments {
     #[arg(long)]
     refine_extrinsics: bool,
     /// The cloud's files: cloud.ply, cloud.las, or both
-    #[arg(long, value_name = "FORMAT", value_enum, default_value = "ply")]
-    cloud_format: CloudFormatArgument,
+    #[arg(long, value_name = "FORMAT", value_parser = cloud_format(), default_value = "ply")]
+    cloud_format: CloudFormat,
     /// Keep mixed pixels, isolated points and moving points in the cloud
     #[arg(long)]
     keep_outliers: bool,
@@ -155,29 +156,20 @@ pub(super) struct EstimatorArguments {
     pub profile: bool,
 }
 
-/// In which formats the cloud is written.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CloudFormatArgument {
-    Ply,
-    Las,
-    Both,
-}
-
-impl From<CloudFormatArgument> for CloudFormat {
-    fn from(format: CloudFormatArgument) -> Self {
-        match format {
-            CloudFormatArgument::Ply => Self::Ply,
-            CloudFormatArgument::Las => Self::Las,
-            CloudFormatArgument::Both => Self::Both,
-        }
-    }
+/// Parses the formats in which the cloud is written.
+fn cloud_format() -> impl TypedValueParser<Value = CloudFormat> {
+    PossibleValuesParser::new(["ply", "las", "both"]).map(|name| match name.as_str() {
+        "las" => CloudFormat::Las,
+        "both" => CloudFormat::Both,
+        _ => CloudFormat::Ply,
+    })
 }
 
 impl EstimatorArguments {
     pub(super) fn options(&self) -> anyhow::Result<EstimateOptions> {
         let mut estimator = self.settings.spec()?;
         estimator.extrinsics.estimated |= self.refine_extrinsics;
-        let options = CloudOptions { format: self.cloud_format.into(), keep_outliers: self.keep_outliers };
+        let options = CloudOptions { format: self.cloud_format, keep_outliers: self.keep_outliers };
         let cloud = (!self.metrics_only).then_some(options);
         Ok(EstimateOptions { closed_loop: !self.open_loop, cloud, ..EstimateOptions::with(estimator) })
     }

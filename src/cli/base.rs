@@ -90,13 +90,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     results.extend(estimate.as_ref().map(|imu| result("imu", "base IMU and spring law", imu.trajectory.clone())));
     let wanted = arguments.out.out.clone().unwrap_or_else(|| PathBuf::from("results/base"));
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let inputs: Vec<PathBuf> = [Some(&arguments.trajectory), arguments.truth.as_ref(), arguments.base_imu.as_ref()]
-        .into_iter()
-        .flatten()
-        .cloned()
-        .collect();
-    let written: Vec<PathBuf> = results.iter().map(|result| folder.join(result.file())).collect();
-    output::check_not_inputs(&inputs, &written)?;
+    let inputs = [Some(&arguments.trajectory), arguments.truth.as_ref(), arguments.base_imu.as_ref()];
+    output::check_not_inputs(inputs.iter().flatten(), results.iter().map(|result| folder.join(result.file())))?;
     let (mut words, mut figures) = write_results(&results, truth.as_ref(), &folder)?;
     if let Some(imu) = &estimate {
         let (offset_ms, sigma_ms) = (imu.clock_offset_s * 1e3, imu.clock_offset_sigma_s * 1e3);

@@ -73,8 +73,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     bars.finish();
     let bounded = bounded?;
     let folder = arguments.out.as_ref().map(|wanted| write_results(&bounded, wanted, arguments)).transpose()?;
-    output::print_result(global, &text(&bounded), figures(&bounded, world.name()), folder.as_deref())?;
-    Ok(Completion::Done)
+    output::print_result(global, &text(&bounded), figures(&bounded, world.name()), folder.as_deref())
 }
 
 fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
@@ -91,7 +90,7 @@ fn world(arguments: &Arguments, reader: &Reader) -> anyhow::Result<World> {
 fn write_results(bounded: &RecordingBound, wanted: &Path, arguments: &Arguments) -> anyhow::Result<output::Folder> {
     let folder = output::folder(wanted, arguments.force)?;
     let written = ["bound.csv", "bound.svg", "bound.png"].map(|name| folder.join(name));
-    output::check_not_inputs(std::slice::from_ref(&arguments.recording), &written)?;
+    output::check_not_inputs([&arguments.recording], written)?;
     replace_text(&folder.join("bound.csv"), &csv(bounded))?;
     zsim_report::bound_over_time(&bounded.bound).save(&folder, "bound")?;
     Ok(folder)

@@ -78,8 +78,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let out = &arguments.out;
     let folder = out.out.as_ref().map(|wanted| output::folder(wanted, out.force)).transpose()?;
     if let Some(folder) = &folder {
-        let inputs: Vec<PathBuf> = arguments.estimates.iter().chain([&arguments.truth]).cloned().collect();
-        output::check_not_inputs(&inputs, &FILES.map(|name| folder.join(name)))?;
+        let inputs = arguments.estimates.iter().chain([&arguments.truth]);
+        output::check_not_inputs(inputs, FILES.map(|name| folder.join(name)))?;
         write(folder, &truth.trajectory, &compared, &figures)?;
     }
     output::print_result(global, &text(&compared, global.verbose), figures, folder.as_deref())?;

@@ -73,8 +73,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         arguments.out.out.as_ref().map(|wanted| write_results(&seen, wanted, arguments.out.force)).transpose()?;
     contact.contact().iter().for_each(|contact| bar.note(&contact.warning()));
     drop(bar);
-    output::print_result(global, &document(&seen).text(), serde_json::to_value(&seen)?, folder.as_deref())?;
-    Ok(Completion::Done)
+    output::print_result(global, &document(&seen).text(), serde_json::to_value(&seen)?, folder.as_deref())
 }
 
 fn write_results(seen: &Coverage, wanted: &Path, force: bool) -> anyhow::Result<output::Folder> {

@@ -2,7 +2,7 @@
 
 use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, calibration, start};
-use super::bars::{Bars, stop_flag};
+use super::bars::Bars;
 use super::live::LiveArguments;
 use super::{full_run, output};
 use clap::Args;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use zsim_base::geometry::Pose;
 use zsim_recording::{Reader, TopicPreference};
 use zsim_report::page::LivePage;
-use zsim_run::{EstimateOptions, MapOptions, ProgressMonitor, RunEvent};
+use zsim_run::{EstimateOptions, MapOptions, ProgressMonitor};
 
 /// Estimate trajectory and map from a recording of any program
 ///
@@ -77,24 +77,17 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let (lidar_topic, imu_topic) = (arguments.lidar_topic.clone(), arguments.imu_topic.clone());
     let selection = reader.select(&TopicPreference { lidar_topic, imu_topic })?;
     let stem = arguments.recording.file_stem().unwrap_or_default().to_string_lossy();
-    let mut live = arguments.live.start(|| LivePage::of_recording(&stem))?;
+    let live = arguments.live.start(|| LivePage::of_recording(&stem))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| full_run::default_folder(&stem));
     let folder = output::folder(&wanted, arguments.out.force)?;
     let files = [Some(arguments.recording.clone()), arguments.map.clone(), arguments.calibration.clone()];
-    let inputs: Vec<PathBuf> = files.into_iter().chain([arguments.estimator.settings.file()]).flatten().collect();
-    let written: Vec<PathBuf> = zsim_run::estimate_files().iter().map(|name| folder.join(name)).collect();
-    output::check_not_inputs(&inputs, &written)?;
+    let inputs = files.into_iter().chain([arguments.estimator.settings.file()]).flatten();
+    output::check_not_inputs(inputs, zsim_run::estimate_files().iter().map(|name| folder.join(name)))?;
 
-    let mut bars = Bars::new(global);
+    let bars = Bars::new(global);
     full_run::note_other_folder(&folder, &wanted, &bars);
-    let mut report = |event: RunEvent| {
-        live.iter_mut().for_each(|live| live.observe(&event));
-        bars.update(event);
-    };
-    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = zsim_run::estimate_recording(&reader, &selection, &folder, &options, &mut watch);
-    bars.finish();
-    live.into_iter().for_each(|live| live.finish(&outcome, &folder));
-    let outcome = outcome.inspect_err(|_| full_run::print_partial_results(&folder))?;
+    let work =
+        |watch: &mut ProgressMonitor| zsim_run::estimate_recording(&reader, &selection, &folder, &options, watch);
+    let outcome = full_run::observed(work, live, bars, &folder)?;
     full_run::print_outcome(global, &outcome, arguments.estimator.profile, &folder)
 }

@@ -64,8 +64,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         let world = World::load(scene)?;
         evaluate_cloud(cloud, &world, estimated.as_ref(), &mut metrics)?;
     }
-    output::print_result(global, &text(&metrics), Value::Object(metrics), None)?;
-    Ok(Completion::Done)
+    output::print_result(global, &text(&metrics), Value::Object(metrics), None)
 }
 
 fn evaluate_cloud(

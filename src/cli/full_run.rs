@@ -3,14 +3,14 @@
 use super::Completion;
 use super::arguments::{EstimatorArguments, Global, OutArguments, ScenarioArguments};
 use super::bars::{Bars, end_polling, stop_flag};
-use super::live::LiveArguments;
+use super::live::{Live, LiveArguments};
 use super::{message, output, recording_size};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use zsim_report::page::LivePage;
 use zsim_report::{self, Metrics};
-use zsim_run::{EstimateResult, ProgressMonitor, RunEvent};
+use zsim_run::{EstimateResult, ProgressMonitor, RunError, RunEvent};
 use zsim_simulation::{Outputs, Simulation};
 
 #[derive(Args)]
@@ -33,27 +33,36 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let options = arguments.estimator.options()?;
     let simulation = Simulation::prepare(&arguments.scenario.scenario(scene))?;
     let wanted = arguments.out.out.clone().unwrap_or_else(|| default_folder(simulation.world().name()));
-    let mut live = arguments.live.start(|| LivePage::of_simulation(&simulation))?;
-    let mut bars = Bars::new(global);
+    let live = arguments.live.start(|| LivePage::of_simulation(&simulation))?;
+    let bars = Bars::new(global);
     recording_size::check(&simulation, Outputs::All, &wanted, |note| bars.note(note))?;
     let folder = output::folder(&wanted, arguments.out.force)?;
-    let written: Vec<PathBuf> = zsim_run::full_run_files().iter().map(|name| folder.join(name)).collect();
     let inputs = arguments.scenario.inputs(scene).into_iter().chain(arguments.estimator.settings.file());
-    let inputs: Vec<PathBuf> = inputs.chain(simulation.world().mesh_files().iter().cloned()).collect();
-    output::check_not_inputs(&inputs, &written)?;
+    let inputs = inputs.chain(simulation.world().mesh_files().iter().cloned());
+    output::check_not_inputs(inputs, zsim_run::full_run_files().iter().map(|name| folder.join(name)))?;
     note_other_folder(&folder, &wanted, &bars);
 
     simulation.world().notes().iter().for_each(|note| bars.note(note));
+    let work = |watch: &mut ProgressMonitor| zsim_run::simulate_and_estimate(&simulation, &options, &folder, watch);
+    let outcome = observed(work, live, bars, &folder)?;
+    print_outcome(global, &outcome, arguments.estimator.profile, &folder)
+}
+
+/// Does an estimate with its progress in the bars, and on the live page if there is one.
+pub(super) fn observed(
+    work: impl FnOnce(&mut ProgressMonitor) -> Result<EstimateResult, RunError>,
+    mut live: Option<Live>,
+    mut bars: Bars,
+    folder: &Path,
+) -> Result<EstimateResult, RunError> {
     let mut report = |event: RunEvent| {
         live.iter_mut().for_each(|live| live.observe(&event));
         bars.update(event);
     };
-    let mut watch = ProgressMonitor { stop: stop_flag(), report: &mut report };
-    let outcome = zsim_run::simulate_and_estimate(&simulation, &options, &folder, &mut watch);
+    let outcome = work(&mut ProgressMonitor { stop: stop_flag(), report: &mut report });
     bars.finish();
-    live.into_iter().for_each(|live| live.finish(&outcome, &folder));
-    let outcome = outcome.inspect_err(|_| print_partial_results(&folder))?;
-    print_outcome(global, &outcome, arguments.estimator.profile, &folder)
+    live.into_iter().for_each(|live| live.finish(&outcome, folder));
+    outcome.inspect_err(|_| print_partial_results(folder))
 }
 
 /// Notes at the start that the results go to another folder than that `wanted`, which exists.

@@ -98,8 +98,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let document = document(&name(arguments), &head, &curves, &swings)?;
     replace_text(&folder.join("report.html"), &document.html())?;
     drop(bar);
-    output::print_result(global, &document.text(), figures(&curves, &swings)?, Some(&folder))?;
-    Ok(Completion::Done)
+    output::print_result(global, &document.text(), figures(&curves, &swings)?, Some(&folder))
 }
 
 /// Name of the head without folder and extension.

@@ -28,8 +28,7 @@ pub(super) fn run(arguments: &Arguments, command: Command, global: &Global) -> a
     }
     let files: Vec<&Path> = pages.iter().map(|page| page.file.as_path()).collect();
     let words = format!("{} manual pages", pages.len());
-    output::print_result(global, &words, json!({ "pages": files }), Some(&folder))?;
-    Ok(Completion::Done)
+    output::print_result(global, &words, json!({ "pages": files }), Some(&folder))
 }
 
 /// A manual page in section 1.

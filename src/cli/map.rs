@@ -57,8 +57,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let out = &merge.out;
     output::check_file(out, merge.force)?;
     let estimator_file = spec_file(Kind::Estimator, &merge.estimator);
-    let inputs: Vec<PathBuf> = [merge.first.clone(), merge.second.clone()].into_iter().chain(estimator_file).collect();
-    output::check_not_inputs(&inputs, std::slice::from_ref(out))?;
+    let inputs = [merge.first.clone(), merge.second.clone()].into_iter().chain(estimator_file);
+    output::check_not_inputs(inputs, [out])?;
     let merged = zsim_run::merge_map_files(&merge.first, &merge.second, merge.start.as_ref(), &estimator, out)?;
     let [first, second, both] = merged.surfels;
     let at = merged.located.map_from_query;
@@ -82,6 +82,5 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         "share_on_first": fraction,
         "residual_rms_m": residual_m,
     });
-    output::print_result(global, &zsim_report::table(&[], &rows, true), figures, Some(out))?;
-    Ok(Completion::Done)
+    output::print_result(global, &zsim_report::table(&[], &rows, true), figures, Some(out))
 }

@@ -1,6 +1,7 @@
 //! Output of results: folders and files that are not overwritten, and stdout.
 
 use super::arguments::Global;
+use super::completion::Completion;
 use super::usage::Usage;
 use anyhow::{Context, anyhow, bail, ensure};
 use serde_json::Value;
@@ -148,22 +149,22 @@ pub(super) fn create_parent(wanted: &Path) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// When there is one.
-pub(super) fn check_not_inputs(inputs: &[PathBuf], outputs: &[PathBuf]) -> anyhow::Result<()> {
-    let inputs: Vec<FileIdentity> = inputs.iter().flat_map(|path| FileIdentity::of_all(path)).collect();
-    let is_read = |output: &&PathBuf| {
-        let Ok(output) = output.canonicalize() else { return false };
-        output.ancestors().filter_map(FileIdentity::of).any(|identity| inputs.contains(&identity))
-    };
-    match outputs.iter().find(is_read) {
-        None => Ok(()),
-        Some(output) => {
-            let message = format!(
+pub(super) fn check_not_inputs(
+    inputs: impl IntoIterator<Item: AsRef<Path>>,
+    outputs: impl IntoIterator<Item: AsRef<Path>>,
+) -> anyhow::Result<()> {
+    let inputs: Vec<FileIdentity> = inputs.into_iter().flat_map(|path| FileIdentity::of_all(path.as_ref())).collect();
+    for output in outputs {
+        let Ok(path) = output.as_ref().canonicalize() else { continue };
+        ensure!(
+            !path.ancestors().filter_map(FileIdentity::of).any(|identity| inputs.contains(&identity)),
+            Usage(format!(
                 "{} is an input of this command and would be replaced by the result: pass another path",
-                output.display()
-            );
-            Err(Usage(message).into())
-        }
+                output.as_ref().display()
+            ))
+        );
     }
+    Ok(())
 }
 
 /// What identifies a file under all its names: device and inode number.
@@ -213,16 +214,23 @@ fn is_empty(folder: &Path) -> anyhow::Result<bool> {
 }
 
 /// Prints the result of a command: text, or JSON with `--json`. The output path is the last line, or the key `out`.
-pub(super) fn print_result(global: &Global, text: &str, mut json: Value, out: Option<&Path>) -> anyhow::Result<()> {
+pub(super) fn print_result(
+    global: &Global,
+    text: &str,
+    mut json: Value,
+    out: Option<&Path>,
+) -> anyhow::Result<Completion> {
     let out = out.map(|path| path.display().to_string());
     if global.json {
         if let (Some(out), Some(object)) = (out, json.as_object_mut()) {
             object.insert("out".to_owned(), Value::String(out));
         }
-        return write_to_stdout(&printable_json(&(serde_json::to_string_pretty(&json)? + "\n")));
+        write_to_stdout(&printable_json(&(serde_json::to_string_pretty(&json)? + "\n")))?;
+        return Ok(Completion::Done);
     }
     let text = if text.is_empty() { String::new() } else { format!("{}\n", text.trim_end()) };
-    print(&(text + &out.map(|out| out + "\n").unwrap_or_default()))
+    print(&(text + &out.map(|out| out + "\n").unwrap_or_default()))?;
+    Ok(Completion::Done)
 }
 
 /// Prints to stdout, with control characters escaped.

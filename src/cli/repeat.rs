@@ -46,8 +46,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     match repeated.inspect_err(|_| full_run::print_partial_results(&folder))? {
         RepeatedRun::Journey(result) => full_run::print_outcome(global, &result, false, &folder),
         RepeatedRun::OfHead(measures) => {
-            output::print_result(global, &text(&measures), Value::Object(figures(&measures)), Some(&folder))?;
-            Ok(Completion::Done)
+            output::print_result(global, &text(&measures), Value::Object(figures(&measures)), Some(&folder))
         }
     }
 }

@@ -75,9 +75,8 @@ impl Files {
             return Err(Usage(format!("the file `{}` must end in {wanted}", self.file.display())).into());
         }
         let world = World::load(&self.scene)?;
-        let inputs: Vec<PathBuf> =
-            world.mesh_files().iter().cloned().chain(spec_file(Kind::Scene, &self.scene)).collect();
-        output::check_not_inputs(&inputs, std::slice::from_ref(&self.file))?;
+        let inputs = world.mesh_files().iter().cloned().chain(spec_file(Kind::Scene, &self.scene));
+        output::check_not_inputs(inputs, [&self.file])?;
         world.notes().iter().for_each(|note| message::note(note));
         output::check_file(&self.file, self.force)?;
         Ok((world, self.file.clone()))
@@ -110,6 +109,5 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
 fn done(world: &World, out: &Path, what: &str, global: &Global) -> anyhow::Result<Completion> {
     let text = format!("{}: {} triangles, {what}\n", world.name(), world.triangle_count());
     let figures = json!({ "scene": world.name(), "triangles": world.triangle_count() });
-    output::print_result(global, &text, figures, Some(out))?;
-    Ok(Completion::Done)
+    output::print_result(global, &text, figures, Some(out))
 }

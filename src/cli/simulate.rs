@@ -83,8 +83,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         object.insert("seed".to_owned(), json!(simulation.inputs().seed));
         object.insert("truth".to_owned(), json!(truth.map(|truth| truth.display().to_string())));
     }
-    output::print_result(global, &text(&summary, outputs), figures, Some(folder.as_deref().unwrap_or(&recording)))?;
-    Ok(Completion::Done)
+    output::print_result(global, &text(&summary, outputs), figures, Some(folder.as_deref().unwrap_or(&recording)))
 }
 
 /// The files next to a recording; one of the IMU alone has none.

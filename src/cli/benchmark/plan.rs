@@ -65,8 +65,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     }
     drop(bar);
     let words = format!("{count} recordings; then: zsim benchmark score {} --system NAME=FOLDER", folder.display());
-    output::print_result(global, &words, json!({ "recordings": count }), Some(&folder))?;
-    Ok(Completion::Done)
+    output::print_result(global, &words, json!({ "recordings": count }), Some(&folder))
 }
 
 /// Removes the recordings of the suite that are of another one, before the list names them as its own.

@@ -92,8 +92,8 @@ pub(crate) fn run(command: &LiveCommand, global: &Global) -> anyhow::Result<Comp
     // A folder only once there is something to write.
     let folder = command.out.out.as_deref().map(|wanted| output::folder(wanted, command.out.force)).transpose()?;
     if let Some(folder) = &folder {
-        let inputs: Vec<PathBuf> = [&command.map, &command.calibration].into_iter().flatten().cloned().collect();
-        output::check_not_inputs(&inputs, &["recording.mcap", "open_loop.tum"].map(|name| folder.join(name)))?;
+        let inputs = [&command.map, &command.calibration].into_iter().flatten();
+        output::check_not_inputs(inputs, ["recording.mcap", "open_loop.tum"].map(|name| folder.join(name)))?;
     }
     let folder_path = folder.as_ref().map(|folder| folder.to_path_buf());
     let setup = Setup { spec, calibration: sensors.found.calibration.clone(), map };

@@ -79,8 +79,8 @@ pub(crate) fn run(command: &PlayCommand, global: &Global) -> anyhow::Result<Comp
     let Player { bridge, counts, latest, .. } = player;
     bridge.finish()?;
     drop(bar);
-    print(&counts, latest, &loss, global)?;
-    Ok(if loss.is_none() { Completion::Done } else { Completion::WithLoss })
+    let done = print(&counts, latest, &loss, global)?;
+    Ok(if loss.is_none() { done } else { Completion::WithLoss })
 }
 
 /// The topics to publish, with their types.
@@ -162,7 +162,7 @@ impl Player {
     }
 }
 
-fn print(counts: &BTreeMap<String, u64>, latest: Duration, loss: &Loss, global: &Global) -> anyhow::Result<()> {
+fn print(counts: &BTreeMap<String, u64>, latest: Duration, loss: &Loss, global: &Global) -> anyhow::Result<Completion> {
     let mut text = String::new();
     for (topic, count) in counts {
         writeln!(text, "{topic:<28} {count:>9} messages")?;

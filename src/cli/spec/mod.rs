@@ -64,7 +64,7 @@ fn kind() -> impl TypedValueParser<Value = Kind> {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Completion> {
     match &arguments.command {
-        Command::List { kind } => list(*kind, global)?,
+        Command::List { kind } => return list(*kind, global),
         Command::Show { kind, name } => output::write_to_stdout(&find(*kind, name)?.text)?,
         Command::Schema { kind } => {
             let text = serde_json::to_string_pretty(&schema(*kind))? + "\n";
@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     Ok(Completion::Done)
 }
 
-fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<()> {
+fn list(wanted: Option<Kind>, global: &Global) -> anyhow::Result<Completion> {
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| wanted.is_none_or(|wanted| wanted == *kind)).collect();
     let width = kinds.iter().map(|kind| kind.folder().len()).max().unwrap_or_default();
     let line = |kind: &Kind| format!("{:width$}  {}", kind.folder(), names(*kind).join(", "));

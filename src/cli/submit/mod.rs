@@ -60,8 +60,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
     let sweep = Sweep::open(&folder)?;
     let status = sweep.status(Shard::WHOLE)?;
     if status.missing == 0 {
-        output::print_result(global, "all runs are complete", json!({ "job": null, "elements": 0 }), Some(&folder))?;
-        return Ok(Completion::Done);
+        return output::print_result(
+            global,
+            "all runs are complete",
+            json!({ "job": null, "elements": 0 }),
+            Some(&folder),
+        );
     }
     let wanted = arguments.elements.unwrap_or_else(|| status.missing.div_ceil(RUNS_PER_ELEMENT).min(MAX_ELEMENTS));
     if wanted == 0 {
@@ -75,8 +79,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         _ => slurm::write(&submission)?,
     };
     if arguments.dry_run {
-        output::print_result(global, "", json!({ "job": null, "elements": elements }), Some(&file))?;
-        return Ok(Completion::Done);
+        return output::print_result(global, "", json!({ "job": null, "elements": elements }), Some(&file));
     }
     let job = if arguments.slurm {
         json!(slurm::submit(&file, &arguments.sbatch)?)
@@ -84,6 +87,5 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> anyhow::Result<Comp
         json!(kubernetes::submit(&file)?)
     };
     let words = format!("job {job}: {elements} elements for {} runs; then: zsim sweep merge", status.missing);
-    output::print_result(global, &words, json!({ "job": job, "elements": elements }), Some(&folder))?;
-    Ok(Completion::Done)
+    output::print_result(global, &words, json!({ "job": job, "elements": elements }), Some(&folder))
 }
