@@ -21,6 +21,8 @@ const GATE_EDGES: f64 = 0.25;
 const FACING_COSINE: f64 = 0.7;
 /// Minimum number of surfaces facing a direction for the evaluation.
 const MIN_FACING: usize = 8;
+/// A direction of translation is weak if its information is below this fraction of the largest one.
+const WEAK_INFORMATION: f64 = 0.02;
 /// Standard deviation of a match, m: drift within a node distorts the surfaces.
 const MATCH_SIGMA_M: f64 = 0.1;
 
@@ -68,6 +70,20 @@ pub(super) struct Fit {
     pub(super) information: Matrix4<f64>,
     /// Number of matches in the last iteration.
     pub(super) matches: usize,
+}
+
+impl Fit {
+    /// The fit with the translation of `start` along the directions of little information.
+    pub(super) fn held_along_weak_directions(mut self, start: &Alignment) -> Self {
+        let eigen = self.information.fixed_view::<3, 3>(1, 1).into_owned().symmetric_eigen();
+        let moved = self.alignment.shift - start.shift;
+        for (direction, information) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
+            if *information < WEAK_INFORMATION * eigen.eigenvalues.max() {
+                self.alignment.shift -= direction * direction.dot(&moved);
+            }
+        }
+        self
+    }
 }
 
 impl NodeSurfels {
@@ -166,4 +182,21 @@ fn directions(patches: &[Patch]) -> [Vector; 3] {
     let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
     let along = Vector::new(angle.cos(), angle.sin(), 0.0);
     [Vector::z(), along, Vector::z().cross(&along)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corridor along y with a floor.
+    #[test]
+    fn a_fit_keeps_its_translation_but_along_a_corridor() {
+        let information = Matrix4::from_diagonal(&Vector4::new(3e5, 2e4, 100.0, 1e3));
+        let alignment = Alignment { yaw: 0.01, shift: Vector::new(0.1, 1.6, 0.2) };
+        let fit = Fit { alignment, information, matches: 100 };
+        let start = Alignment { yaw: 0.0, shift: Vector::new(0.0, 0.5, 0.0) };
+        let held = fit.held_along_weak_directions(&start).alignment;
+        assert!((held.shift - Vector::new(0.1, 0.5, 0.2)).norm() < 1e-12, "{held:?}");
+        assert_eq!(held.yaw, alignment.yaw);
+    }
 }

@@ -174,16 +174,15 @@ impl LoopSearch<'_> {
     }
 
     /// Relative poses of successive nodes with enough common surfaces.
+    ///
+    /// Along a weak direction the pose of the trajectory remains: along a corridor the registered one slips from door to door.
     pub(super) fn links(&self) -> Vec<RelativePose> {
         let link = |early: usize| {
             let nodes = NodePair { late: early + 1, early };
-            let fit = align(
-                &self.surfels(nodes.late),
-                &self.surfels(nodes.early),
-                &self.current_alignment(nodes),
-                self.matcher,
-            )?;
-            (fit.matches >= MIN_LINK_MATCHES).then(|| self.relative_pose(nodes, &fit))
+            let alignment = self.current_alignment(nodes);
+            let fit = align(&self.surfels(nodes.late), &self.surfels(nodes.early), &alignment, self.matcher)?;
+            (fit.matches >= MIN_LINK_MATCHES)
+                .then(|| self.relative_pose(nodes, &fit.held_along_weak_directions(&alignment)))
         };
         (0..self.database.nodes.len().saturating_sub(1)).into_par_iter().filter_map(link).collect()
     }
