@@ -97,3 +97,24 @@ fn an_error_in_a_claim_has_its_line() {
         assert!(code == 2 && stderr.contains(sentence) && stderr.contains("springs.ron:9:"), "{claim}: {stderr}");
     }
 }
+
+#[test]
+fn a_claim_about_a_place_without_runs_is_missed() {
+    let here = tempfile::tempdir().unwrap();
+    let place = r#"at: {"wire_diameter_mm": 2.6, "active_coils": 10.0}"#;
+    let other = r#"than: {"wire_diameter_mm": 3.2, "active_coils": 12.0}"#;
+    // A single sample is at one of the four places only.
+    let met = |claim: &str| {
+        let text = study(claim).replace("measures:", "sampling: latin_hypercube(count: 1), measures:");
+        let places = [("2.6", "10.0"), ("2.6", "12.0"), ("3.2", "10.0"), ("3.2", "12.0")];
+        places.map(|(wire, coils)| {
+            let there = format!(r#"at: {{"wire_diameter_mm": {wire}, "active_coils": {coils}}}"#);
+            std::fs::write(here.path().join("springs.ron"), text.replace(place, &there)).unwrap();
+            run(here.path(), "study springs.ron -o out --force").0 == 0
+        })
+    };
+    let at_one = met(&format!(r#"median(what: "m", {place}, measure: spring_mass_g, most: 900)"#));
+    assert_eq!(at_one.iter().filter(|met| **met).count(), 1, "{at_one:?}");
+    let [before @ .., _itself] = met(&format!(r#"smaller(what: "s", measure: spring_mass_g, {place}, {other})"#));
+    assert_eq!(before, [false; 3]);
+}

@@ -28,6 +28,18 @@ pub struct ComparedNumber {
 }
 
 impl ComparedNumber {
+    /// A claim about a place where a sampled study has no run: it is missed.
+    fn without_runs(claim: &ClaimSpec, place: &Place) -> Self {
+        let one = Goal { is_most: false, median: 1.0, worst: None };
+        Self {
+            figure: claim.figure().unwrap_or("-").to_owned(),
+            what: place_name(claim.what(), place),
+            paper: "-".to_owned(),
+            ours: "no run is there".to_owned(),
+            comparison: Comparison::with_goal("runs", None, one, &[0.0]),
+        }
+    }
+
     /// Whether the result misses its goal.
     pub fn is_missed(&self) -> bool {
         self.comparison.as_ref().is_some_and(|comparison| comparison.verdict == Verdict::Missed)
@@ -89,6 +101,11 @@ impl Sweep {
     }
 
     fn judged(&self, claim: &ClaimSpec, runs: &Runs) -> Result<ComparedNumber, StudyError> {
+        for place in claim.places() {
+            if self.figures_at(runs, place, claim.measures()[0])?.is_empty() {
+                return Ok(ComparedNumber::without_runs(claim, place));
+            }
+        }
         let (what, paper, ours, comparison) = match claim {
             ClaimSpec::Median { at, measure, most, least, worst, paper, paper_text, .. } => {
                 let (unit, factor) = display_unit(*measure);
